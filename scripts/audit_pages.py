@@ -39,7 +39,7 @@ from tests.report.documents import months_runs
 from urdfkin.comparison.result import SameQuestion
 from urdfkin.comparison.verdict import same
 from urdfkin.report.history import as_html as history_page
-from urdfkin.report.history import history
+from urdfkin.report.history import read_history
 from urdfkin.report.html import as_files, as_html
 from urdfkin.report.same import as_html as same_page
 from urdfkin.robot.trajectory import line
@@ -135,7 +135,7 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
         for i, report in enumerate(months_runs()):
             (folder / "runs" / f"{i}.json").write_text(json.dumps(report), encoding="utf-8")
         (folder / "runs" / "broken.json").write_text("{")
-        return history_page(history([folder / "runs"]))
+        return history_page(read_history([folder / "runs"]))
 
     return {
         "good": lambda: page(["panda", "ur5", "talos"], 6),

@@ -20,10 +20,10 @@ from typing import Any
 
 from urdfkin.urdf.catalogue import example_robots
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Cut, run_chunk
-from urdfkin.validation.cluster import connected
+from urdfkin.validation.chunk import Chunking, run_chunk
+from urdfkin.validation.cluster import connect_cluster
 from urdfkin.validation.results import ValidationReport
-from urdfkin.validation.robot_input import subject
+from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.validation.store import Manifest, open_store
 
 
@@ -37,9 +37,9 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
     """Validate with two local Dask workers; print the time without the start and the end of the workers."""
-    with connected("local:2") as two:
+    with connect_cluster("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
-        chunks = len(Cut(how["samples"])) * len(robots[0])
+        chunks = len(Chunking(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
         own = 1e3 * (time.process_time() - before) / chunks
@@ -86,14 +86,14 @@ def measure_chunk() -> None:
             moments.append(time.process_time())
         return 1e3 * median(after - before for before, after in pairwise(moments))
 
-    robot, cut = subject("ur5"), Cut(100_000)
+    robot, cut = make_robot_input("ur5"), Chunking(100_000)
     chunk = cut.chunk(robot, 0, 1)
     found = run_chunk(chunk)
     print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
-        print(f"time to store it: {cost(lambda i: kept.keep(0, i, found)):.2f} ms")
-        print(f"time to read it: {cost(lambda i: kept.answer(0, i)):.2f} ms")
+        print(f"time to store it: {cost(lambda i: kept.write_answer(0, i, found)):.2f} ms")
+        print(f"time to read it: {cost(lambda i: kept.read_answer(0, i)):.2f} ms")
     print(f"time to add two: {cost(lambda _: found + found):.2f} ms")
 
 

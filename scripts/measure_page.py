@@ -40,7 +40,7 @@ def fleet(robots: int) -> Document:
     document = validate(list(_ROBOTS), samples=10).as_dict()
     few = islice(cycle(document["robots"]), robots)
     document["robots"] = [robot | {"source": f"fleet/{i:04}.urdf"} for i, robot in enumerate(few)]
-    document["asked"] = robots
+    document["robots_requested"] = robots
     return document
 
 

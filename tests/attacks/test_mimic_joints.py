@@ -231,7 +231,7 @@ def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> 
     own = "joint leader ranges over -0.005 to 0.055 m"
     allowed = "its mimic joints are within their limits only for values from -0.005 to 0.005 (f1)"
     assert f"{own}; {allowed}" in robot._sheet().text()
-    kept = [joint["kept"] for joint in describe(robot)["joints"]]
+    kept = [joint["remaining_range"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
     (none,) = range_reductions(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
     assert str(none).endswith("at most one value keeps all its mimic joints within their limits (f1)")

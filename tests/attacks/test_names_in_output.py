@@ -37,7 +37,7 @@ from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION, Document
-from urdfkin.view.dh_drawing import drawing
+from urdfkin.view.dh_drawing import draw_table_svg
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")]
 
@@ -237,7 +237,7 @@ def test_a_drawing_has_the_same_elements_with_any_names() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]
         robot = urdfkin.load(chain_of_all(names, called(NAMES["math"])))
-        svg = etree.fromstring(drawing(robot.dh(names[-1])).encode())
+        svg = etree.fromstring(draw_table_svg(robot.dh(names[-1])).encode())
         comments = [str(comment.text).strip() for comment in svg.iter(etree.Comment)]
         assert [c for c in comments if not re.fullmatch(r"\$[xz]_\{\d+\}\$(, \$[xz]_\{\d+\}\$)*", c)] == []
         return [
@@ -249,5 +249,5 @@ def test_a_drawing_has_the_same_elements_with_any_names() -> None:
 
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
 def test_dollar_signs_in_a_name_are_not_rendered_as_mathematics(name: str) -> None:
-    svg = etree.fromstring(drawing(table(name)).encode())
+    svg = etree.fromstring(draw_table_svg(table(name)).encode())
     assert name in " ".join("".join(map(str, element.itertext())) for element in svg.iter("{*}text"))

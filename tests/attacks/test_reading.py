@@ -28,7 +28,7 @@ from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.catalogue import find_package
 from urdfkin.validation.campaign import StoreWarning, validate
-from urdfkin.validation.store import AccuracyResult, Store
+from urdfkin.validation.store import AccuracyStore, Store
 from urdfkin.view import scene
 from urdfkin.view.scene import shapes
 
@@ -133,12 +133,12 @@ def test_files_of_a_store_that_are_links_to_a_device_are_not_read(tmp_path: Path
     validate("planar_two_link", samples=10, store=tmp_path)
     messages: list[str] = []
     (tmp_path / "accuracy.json").symlink_to("/dev/zero")
-    assert AccuracyResult.of(Store.reading(tmp_path, messages.append)) is None
+    assert AccuracyStore.open(Store.open_read_only(tmp_path, messages.append)) is None
     assert "no accuracy results" in messages[0]
     (chunk,) = tmp_path.glob("chunks/*/*.chunk")
     chunk.unlink()
     chunk.symlink_to("/dev/zero")
-    assert Store.reading(tmp_path, messages.append).answer(0, 0) is None
+    assert Store.open_read_only(tmp_path, messages.append).read_answer(0, 0) is None
     assert "computed again" in messages[-1]
     words = "is damaged and is computed again: not a regular file: a character device"
     with pytest.warns(StoreWarning, match=words):
@@ -147,7 +147,7 @@ def test_files_of_a_store_that_are_links_to_a_device_are_not_read(tmp_path: Path
     (tmp_path / "manifest.json").unlink()
     (tmp_path / "manifest.json").symlink_to("/dev/zero")
     with pytest.raises(SourceError, match="not a regular file"):
-        Store.reading(tmp_path, messages.append)
+        Store.open_read_only(tmp_path, messages.append)
 
 
 @pytest.mark.parametrize(
@@ -280,5 +280,5 @@ def test_files_that_a_mesh_names_are_read_only_if_they_are_regular_files_in_its_
         visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
         (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
         (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))
-        assert scene.mesh(shape) is not None
+        assert scene.make_mesh(shape) is not None
     assert read == ["a.obj", "own.obj", "own.mtl"]

@@ -106,7 +106,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     }  # fmt: skip
     report["robots"] += [refused | {"joints": [], "frames": [], "chains": [], "results": 0}]
     report["sha256"].append(None)
-    report |= {"asked": 2, "verdict": "bad input", "reason": "1 of 2 robots has bad input"}
+    report |= {"robots_requested": 2, "verdict": "bad input", "reason": "1 of 2 robots has bad input"}
     report["command"], report["started"] = NAMES["colours"], NAMES["erased"]
     Path(made["REPORT"]).write_text(json.dumps(report))
     return made | WORDS

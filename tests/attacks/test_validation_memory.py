@@ -20,7 +20,7 @@ from urdfkin.validation import memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import run_chunk
 from urdfkin.validation.document import ValidationVerdict
-from urdfkin.validation.robot_input import subject
+from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 GB = 10**9
@@ -47,12 +47,12 @@ def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memo
 def test_comparing_in_blocks_changes_no_number(
     source: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (chunk,) = chunks(subject(source, None, root_joint), 5, 3)
+    (chunk,) = chunks(make_robot_input(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
     monkeypatch.setattr(memory, "BLOCK_BYTES", 2 * memory.frame_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
-    assert parts.tallies == whole.tallies
-    assert list(parts.tallies) == list(whole.tallies)
+    assert parts.error_stats == whole.error_stats
+    assert list(parts.error_stats) == list(whole.error_stats)
 
 
 @pytest.mark.long
@@ -71,7 +71,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
         for where in (evaluate, PinocchioOracle):
             monkeypatch.setattr(where, name, recorded(getattr(where, name)))
     monkeypatch.setattr(memory, "BLOCK_BYTES", 100_000)
-    (chunk,) = chunks(subject("talos"), 5, 3)
+    (chunk,) = chunks(make_robot_input("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100
     assert 50_000 < max(sizes) <= 100_000
@@ -121,14 +121,14 @@ def test_a_robot_that_needs_too_much_memory_is_not_verified_and_pinocchio_builds
 @pytest.mark.long
 def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> None:
     trees = [urdfkin.load(chain([limit()] * n, "revolute")).tree for n in (100, 200)]
-    needs = [memory.needed_bytes(tree, 28) for tree in trees]
+    needs = [memory.estimate_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
     one_link = urdfkin.load('<robot name="r"><link name="l0"/></robot>').tree
-    assert memory.needed_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    assert memory.estimate_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
     leaves = (f'<link name="e{i}"/>' + joint(f"e{i}", "fixed", "l100", f"e{i}") for i in range(1000))
     wide = chain([limit()] * 100, "revolute").replace("</robot>", "".join([*leaves, "</robot>"]))
-    assert memory.needed_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
+    assert memory.estimate_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
     memory.check(trees[0], 28, needs[0])
     memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):

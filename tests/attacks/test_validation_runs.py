@@ -17,11 +17,11 @@ from tests.validation import faulty_worker
 from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
+from urdfkin.validation.chunk import Chunk, Chunking, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict, outcome
 from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.results import ValidationReport
-from urdfkin.validation.robot_input import RobotInput, subject
+from urdfkin.validation.robot_input import RobotInput, make_robot_input
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
@@ -29,7 +29,7 @@ run = partial(subprocess.run, capture_output=True, text=True, check=False)
 
 
 def chunks(robot: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
-    cut = Cut(samples)
+    cut = Chunking(samples)
     return (cut.chunk(robot, seed, index) for index in range(len(cut)))
 
 
@@ -90,7 +90,7 @@ def test_robots_after_the_breakdown_of_an_executor_are_not_verified(when_asked: 
     assert verdicts(report) == ["verified", "not verified", "not verified"]
     for robot in report.robots[1:]:
         assert "BrokenExecutor: a worker died" in str(robot.reason)
-    assert report.asked == 3
+    assert report.robots_requested == 3
 
 
 @pytest.mark.long
@@ -152,7 +152,7 @@ def test_a_disagreement_takes_precedence_over_an_error(monkeypatch: pytest.Monke
         if chunk.index == 1:
             raise MemoryError
         result = run_chunk(chunk)
-        return replace(result, tallies={k: replace(t, failed=1) for k, t in result.tallies.items()})
+        return replace(result, error_stats={k: replace(t, failed=1) for k, t in result.error_stats.items()})
 
     monkeypatch.setattr(answer, "run_chunk", failing)
     report = validate("planar_two_link", samples=50)
@@ -169,7 +169,7 @@ def test_an_error_of_the_engine_is_the_result_of_each_unfinished_robot(
 ) -> None:
     right = SerialEngine.run
 
-    def breaks(self: SerialEngine, work: engines.Work, enter: engines.Enter) -> None:
+    def breaks(self: SerialEngine, work: engines.Work, enter: engines.AnswerCallback) -> None:
         right(self, list(work)[:1], enter)
         raise OSError("no more of anything")
 
@@ -210,7 +210,7 @@ def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() 
     ],
 )
 def test_exit_code_1_means_only_a_disagreement(verdicts: list[str], interrupted: bool, code: int) -> None:
-    found = outcome(verdicts, asked=len(verdicts), interrupted=interrupted)
+    found = outcome(verdicts, robots_requested=len(verdicts), interrupted=interrupted)
     assert found.exit_code == code
     assert not found.passed
 
@@ -222,7 +222,7 @@ def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
     ran: list[tuple[str, int]] = []
 
     def interrupted(chunk: Chunk) -> ChunkResult:
-        ran.append((chunk.subject.label, chunk.index))
+        ran.append((chunk.robot_input.label, chunk.index))
         if ran[-1] == ("ur5", 1):
             raise KeyboardInterrupt
         return run_chunk(chunk)
@@ -252,7 +252,7 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
                 raise KeyboardInterrupt
             return made[-1]
 
-    tasks = [Task(0, chunk) for chunk in chunks(subject("ur5"), 100, 0)]
+    tasks = [Task(0, chunk) for chunk in chunks(make_robot_input("ur5"), 100, 0)]
     with pytest.raises(KeyboardInterrupt):
         ExecutorEngine(Never()).run([tasks], lambda *_: None)
     assert [future.cancelled() for future in made] == [True, True, False]

@@ -92,7 +92,11 @@ def test_a_signal_keeps_finished_results_in_every_report(
     assert process.returncode == 128 + number, err
     assert end_soon(workers)
     document = json.loads((tmp_path / "r.json").read_text())
-    assert (document["interrupted"], document["verdict"], document["asked"]) == (True, "interrupted", 2)
+    assert (document["interrupted"], document["verdict"], document["robots_requested"]) == (
+        True,
+        "interrupted",
+        2,
+    )
     first, second = document["robots"]
     assert (first["verdict"], first["samples"]) == ("verified", 1_003)
     assert (second["verdict"], second["failed"]) == ("not verified", 0)

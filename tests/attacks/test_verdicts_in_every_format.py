@@ -27,7 +27,7 @@ from urdfkin.verify.tables import TableCheck
 def _outside(_: pytest.MonkeyPatch) -> Document:
     document = failing()
     del document["robots"][1:], document["sha256"][1:]
-    return document | {"asked": 1, "reason": "1 of 1 robot disagrees"}
+    return document | {"robots_requested": 1, "reason": "1 of 1 robot disagrees"}
 
 
 def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
@@ -40,7 +40,7 @@ def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
     right = robot_summary.chains_of
 
     def without(*args: Any) -> tuple[Any, ...]:
-        return tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args))
+        return tuple(chain | {"bound_ratio": None, "worst": None} for chain in right(*args))
 
     monkeypatch.setattr(robot_summary, "chains_of", without)
     return _document("ur5")
@@ -63,7 +63,11 @@ def _interrupted(_: pytest.MonkeyPatch) -> Document:
 
 
 def _missing(_: pytest.MonkeyPatch) -> Document:
-    return arms() | {"asked": 3, "verdict": "not verified", "reason": "1 of 3 robots without a report"}
+    return arms() | {
+        "robots_requested": 3,
+        "verdict": "not verified",
+        "reason": "1 of 3 robots without a report",
+    }
 
 
 HUGE = chain([""] * 320, origin="", name="huge")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.calibration.calibrate import Calibration, calibrate
-from urdfkin.calibration.parameters import CalibrationModel, urdf_model
+from urdfkin.calibration.parameters import CalibrationModel, make_urdf_model
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -87,10 +87,10 @@ def bench(
 ) -> Bench:
     """Return a robot whose parameters have errors of about `error` (m, rad), except base and tool."""
     robot = load(name, verify=False)
-    model = urdf_model(robot.tree, tip, base, fit)
+    model = make_urdf_model(robot.tree, tip, base, fit)
     rng = np.random.default_rng(seed)
     truth = error * rng.standard_normal(len(model.chain.parameters))
-    truth[[p.end for p in model.chain.parameters]] = 0.0
+    truth[[p.is_base_or_tool for p in model.chain.parameters]] = 0.0
     q = robot.sample(poses, seed)
     values = model.coupling.values(model.coupling.select(robot.tree, q))
     return Bench(robot, model, truth, q, model.chain.poses(values, truth))

@@ -17,10 +17,10 @@ from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import read_poses
 from urdfkin.calibration.universal_robots import (
     LINKS,
-    calibrated_tree,
+    apply_factory_calibration,
     distance,
+    make_calibrated_tree,
     read_calibration,
-    universal_robots,
 )
 from urdfkin.calibration.write_back import nearest_rpy, with_origins
 from urdfkin.dh.rows import table_from_rows
@@ -199,7 +199,7 @@ def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Pa
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
     true = controller().placement(q)
     driver, urdf = (
-        make_chain(calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
+        make_chain(make_calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
         for order in ("driver", "urdf")
     )
     assert np.abs(driver - true).max() < ROUNDING
@@ -214,40 +214,40 @@ def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Pa
 @pytest.mark.parametrize("prefix", ["", "left_"])
 def test_the_calibration_file_is_written_to_the_urdf_of_the_ros_description(prefix: str, file: Path) -> None:
     robot = load(description(prefix))
-    found = universal_robots(robot, file, "urdf")
+    found = apply_factory_calibration(robot, file, "urdf")
     assert present(found.certificate).verified
     written = load(found.text)
     for (link, name), T in zip(LINKS.items(), drawn_in(), strict=True):
         here = written.tree.joints[written.tree.joint_index(prefix + name)].T_parent_joint
         assert np.abs(here[:3, 3] - T[:3, 3]).max() < 1e-15, link
     q = written.sample(20)
-    true = universal_robots(robot, file)
+    true = apply_factory_calibration(robot, file)
     T = load(true.text).placement(q, [f"{prefix}base", f"{prefix}tool0"])
     assert np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - controller().placement(q)).max() < ROUNDING
-    assert max(turn for _, turn in true.moved.values()) < 0.01
+    assert max(turn for _, turn in true.displacements.values()) < 0.01
     assert true.changes.total is not None
 
 
 def test_the_frames_of_the_older_description_move_by_less_than_60_millimetres(file: Path) -> None:
     robot = load("ur10")
-    found = universal_robots(robot, file)
+    found = apply_factory_calibration(robot, file)
     assert found.certificate is not None
     written = load(found.text)
     q = written.sample(20)
     T = written.placement(q, ["base", "tool0"])
     assert np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - controller().placement(q)).max() < ROUNDING
     # The shoulders and wrists of a UR10 and a UR10e are 5 cm apart; no frame moves by 439 m.
-    assert max(shift for shift, _ in found.moved.values()) < 0.06
+    assert max(shift for shift, _ in found.displacements.values()) < 0.06
 
 
 @pytest.mark.slow
 def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
     urdf = load("ur5").urdf
     with pytest.raises(InputError, match="no choice of joint origins makes the robot move like"):
-        universal_robots(urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>'), file)
+        apply_factory_calibration(urdf.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>'), file)
     seventh = urdf.replace('"wrist_3_link-tool0_fixed_joint" type="fixed"', '"flange" type="continuous"')
     with pytest.raises(InputError, match="different numbers of coordinates: found 7 and 6"):
-        universal_robots(seventh, file)
+        apply_factory_calibration(seventh, file)
 
 
 @pytest.mark.slow
@@ -273,9 +273,9 @@ def test_an_invalid_calibration_file_is_reported(text: str, words: str, tmp_path
 
 def test_an_unsuitable_robot_and_an_unknown_rotation_order_are_reported(file: Path) -> None:
     with pytest.raises(InputError, match="the robot is not a Universal Robots arm"):
-        universal_robots("panda", file)
+        apply_factory_calibration("panda", file)
     with pytest.raises(UnknownNameError, match="driver"):
-        universal_robots("ur5", file, "drivers")
+        apply_factory_calibration("ur5", file, "drivers")
 
 
 # -- new origins in a URDF ------------------------------------------------------------------------

@@ -10,9 +10,9 @@ from rich.console import Console
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.calibration.test_parameters import table
 from tests.reading import present
-from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
-from urdfkin.calibration.fit import stacked
-from urdfkin.calibration.parameters import table_model
+from urdfkin.calibration.calibrate import Calibration, calibrate, list_warnings
+from urdfkin.calibration.fit import stack_jacobian
+from urdfkin.calibration.parameters import make_table_model
 from urdfkin.dh.table import DHConvention
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
@@ -30,32 +30,32 @@ def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("full_poses", [True, False])
 @pytest.mark.parametrize(("arm", "tip", "base"), [("ur5", "tool0", "base"), (BRANCHED, "hand", "b")])
 def test_without_noise_the_true_arm_is_identified_within_rounding(
-    arm: str, tip: str, base: str, complete: bool
+    arm: str, tip: str, base: str, full_poses: bool
 ) -> None:
     true = bench(arm, ("origins",), tip, base)
-    found = true.calibrate(true.T if complete else true.T[:, :3, 3])
-    fitted = present(found.fitted).at
+    found = true.calibrate(true.T if full_poses else true.T[:, :3, 3])
+    fitted = present(found.full_fit).parameter_values
     error = elsewhere(true, fitted) - elsewhere(true, true.truth)
-    assert np.abs(error if complete else error[:, :3, 3]).max() < 1e-13
+    assert np.abs(error if full_poses else error[:, :3, 3]).max() < 1e-13
     assert present(found.certificate).verified
-    written = load(found.written.text, verify=False)
+    written = load(found.updated_urdf.text, verify=False)
     q = true.robot.sample(20, 99)
     T = np.linalg.solve(written.placement(q, base), written.placement(q, tip))
     assert np.abs(T - elsewhere(true, fitted)).max() < 1e-13
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("complete", [True, False])
-def test_any_pose_of_the_instrument_and_of_the_target_is_identified(complete: bool) -> None:
+@pytest.mark.parametrize("full_poses", [True, False])
+def test_any_pose_of_the_instrument_and_of_the_target_is_identified(full_poses: bool) -> None:
     true = bench("panda", ("origins",), "panda_hand", "panda_link0", poses=40)
     B, X = pose(1, 4.0), pose(2, 0.3)
     T = B @ true.T @ X
-    poses = T if complete else T[:, :3, 3]
+    poses = T if full_poses else T[:, :3, 3]
     found = true.calibrate(poses, fit=[*ENDS, "origins"])
-    assert present(found.fitted).rms()[0] < 1e-13
+    assert present(found.full_fit).rms()[0] < 1e-13
     rough = true.calibrate(poses, fit=ENDS)
     # The arm's errors of 2 mm and 2 mrad at each joint cause these errors.
     assert np.linalg.norm(present(rough.base)[:3, 3] - B[:3, 3]) < 0.02
@@ -67,7 +67,7 @@ def test_joints_named_base_and_tool_are_not_confused_with_the_base_and_the_tool(
     true = bench(text, ("origins",), "hand", "trunk")
     B, X = pose(1, 4.0), pose(2, 0.3)
     found = true.calibrate(B @ true.T @ X, fit=[*ENDS, "origins"])
-    assert present(found.fitted).rms()[0] < 1e-13
+    assert present(found.full_fit).rms()[0] < 1e-13
     assert set(found.origins) <= {"base", "tool", "fix"}
     assert np.abs(present(found.base) - B).max() < 0.05
 
@@ -76,27 +76,29 @@ def test_joint_offsets_alone_are_identified() -> None:
     true = bench(BRANCHED, ("offsets",), "hand", "trunk", error=0.05)
     found = true.calibrate(fit=["offsets"])
     assert [str(parameter) for parameter in found.parameters] == ["three rz", "four rz"]
-    np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
+    np.testing.assert_allclose(found.changes, true.truth, atol=1e-14)
 
 
 def test_gains_are_identified_and_not_written() -> None:
     true = bench("ur5", ("gains",), "tool0", "base", error=1e-3)
     found = true.calibrate(fit=["gains"])
-    np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
-    assert found.written.text == true.robot.urdf.encode()
+    np.testing.assert_allclose(found.changes, true.truth, atol=1e-14)
+    assert found.updated_urdf.text == true.robot.urdf.encode()
     words = "these gains are not written, because a URDF cannot store them: "
-    assert any(line.startswith(words) for line in doubts(found))
+    assert any(line.startswith(words) for line in list_warnings(found))
 
 
 @pytest.mark.parametrize("convention", list(DHConvention))
 def test_the_cells_of_a_table_are_identified_with_beta_for_parallel_axes(convention: DHConvention) -> None:
     drawn = table(convention)
-    model = table_model(drawn, ("origins",))
-    truth = model.chain.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.chain.start))
+    model = make_table_model(drawn, ("origins",))
+    truth = model.chain.initial_values + 2e-3 * np.random.default_rng(4).standard_normal(
+        len(model.chain.initial_values)
+    )
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
     found = calibrate(drawn, q, model.chain.poses(q, truth))
     assert found.table is not None
-    assert present(found.fitted).rms()[0] < 1e-14
+    assert present(found.full_fit).rms()[0] < 1e-14
     np.testing.assert_allclose(found.table.placement(q), model.chain.poses(q, truth), atol=1e-13)
     assert found.table.convention is convention
     assert max(abs(row.d) for row in found.table.rows) < 0.5
@@ -104,9 +106,9 @@ def test_the_cells_of_a_table_are_identified_with_beta_for_parallel_axes(convent
 
 def whitened(true: Bench, found: Calibration) -> float:
     """Return chi^2, of 6 numbers, of the tip's pose error at a configuration that was not measured."""
-    fitted, q = present(found.fitted), true.robot.sample(1, 99)
-    T, columns = found.model.chain.columns(true.values(q), fitted.at)
-    J = columns[0][:, list(found.identification.kept)]
+    fitted, q = present(found.full_fit), true.robot.sample(1, 99)
+    T, columns = found.model.chain.poses_and_jacobian(true.values(q), fitted.parameter_values)
+    J = columns[0][:, list(found.identification.free_parameters)]
     S = true.poses(q)
     error = np.hstack([S[0, :3, 3] - T[0, :3, 3], log_rotation(S[0, :3, :3] @ T[0, :3, :3].T)])
     return float(error @ np.linalg.solve(J @ fitted.covariance @ J.T, error))
@@ -119,17 +121,17 @@ def test_the_stated_covariance_and_noise_agree_with_repeated_calibrations() -> N
     every = [true.calibrate(true.noisy(metres, radians, seed)) for seed in range(20)]
     # chi^2 of 120 has the standard deviation 15.5; that of estimated noise is a little wider.
     assert 75.0 < sum(whitened(true, found) for found in every) < 180.0
-    noise = np.array([(f.fitted.noise.metres, f.fitted.noise.radians) for f in every if f.fitted])
+    noise = np.array([(f.full_fit.noise.metres, f.full_fit.noise.radians) for f in every if f.full_fit])
     np.testing.assert_allclose(np.sqrt((noise**2).mean(axis=0)), [metres, radians], rtol=0.05)
     # An outlier is reported wrongly in one of a hundred data sets.
-    assert sum(bool(found.odd) for found in every) <= 2
+    assert sum(bool(found.outliers) for found in every) <= 2
     T = true.noisy(1e-4, 1e-4, 0)
     stated = true.calibrate(T, noise=(1e-4, 1e-4))
-    fitted = present(stated.fitted)
-    assert abs(fitted.ratio - 1.0) < 4.0 * fitted.spread
-    assert not doubts(stated)
+    fitted = present(stated.full_fit)
+    assert abs(fitted.noise_ratio - 1.0) < 4.0 * fitted.noise_ratio_deviation
+    assert not list_warnings(stated)
     wrong = true.calibrate(T, noise=(4e-5, 4e-5))
-    assert re.match(r"the residuals are 2\.[3-7]\d* times the stated noise", doubts(wrong)[0])
+    assert re.match(r"the residuals are 2\.[3-7]\d* times the stated noise", list_warnings(wrong)[0])
 
 
 @pytest.mark.slow
@@ -139,13 +141,13 @@ def test_outliers_are_reported_and_excluded_only_on_request() -> None:
     T[17, :3, 3] += [5e-3, 0.0, 0.0]
     T[40, 0, 3] -= 4e-3
     found = true.calibrate(T)
-    assert found.odd == (17, 40)
-    assert "poses 17, 40 are outliers: the rms error is " in doubts(found)[0]
-    clean = true.calibrate(T, drop_odd=True)
-    fits = present(found.fitted), present(clean.fitted)
-    assert [len(fit.errors) for fit in fits] == [60, 58]
+    assert found.outliers == (17, 40)
+    assert "poses 17, 40 are outliers: the rms error is " in list_warnings(found)[0]
+    clean = true.calibrate(T, drop_outliers=True)
+    fits = present(found.full_fit), present(clean.full_fit)
+    assert [len(fit.residuals) for fit in fits] == [60, 58]
     assert fits[1].noise.metres < 1.2e-4 < fits[0].noise.metres
-    assert doubts(clean) == ["poses 17, 40 are excluded as outliers"]
+    assert list_warnings(clean) == ["poses 17, 40 are excluded as outliers"]
 
 
 def test_a_fit_without_redundant_measurements_is_refused() -> None:
@@ -159,8 +161,8 @@ def test_a_fit_without_redundant_measurements_is_refused() -> None:
     out = io.StringIO()
     print_document(Console(file=out, width=200), document(found))
     assert "noise: unknown, because there are no redundant measurements" in out.getvalue()
-    assert not np.isfinite(found.deviations[list(found.identification.kept)]).any()
-    assert any("the fit cannot be checked" in line for line in doubts(found))
+    assert not np.isfinite(found.standard_deviations[list(found.identification.free_parameters)]).any()
+    assert any("the fit cannot be checked" in line for line in list_warnings(found))
 
 
 @pytest.mark.parametrize(
@@ -198,19 +200,21 @@ ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCH
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("full_poses", [True, False])
 @pytest.mark.parametrize("arm", ARMS, ids=["ur5", "panda", "branched, up and down"])
 def test_a_revolute_joint_has_four_identifiable_parameters_and_a_prismatic_one_two(
-    arm: str, complete: bool
+    arm: str, full_poses: bool
 ) -> None:
     tip, base = ARMS[arm]
     robot = load(arm, verify=False)
-    found = calibrate(robot, tip=tip, base=base, fit=["base", "tool", "origins"], complete=complete)
+    found = calibrate(robot, tip=tip, base=base, fit=["base", "tool", "origins"], full_poses=full_poses)
     kinds = [joint.kind.turns for joint in robot.chain(tip, base).joints]
-    law = sum(4 if turns else 2 for turns in kinds) + 6 - (0 if complete else 3)
+    law = sum(4 if turns else 2 for turns in kinds) + 6 - (0 if full_poses else 3)
     assert found.identification.rank == law
-    assert len(found.identification.still) == len(found.parameters) - law
-    gains = calibrate(robot, tip=tip, base=base, fit=["base", "tool", "origins", "gains"], complete=complete)
+    assert len(found.identification.fixed_parameters) == len(found.parameters) - law
+    gains = calibrate(
+        robot, tip=tip, base=base, fit=["base", "tool", "origins", "gains"], full_poses=full_poses
+    )
     assert gains.identification.rank == law + len(kinds)
 
 
@@ -218,17 +222,17 @@ def test_no_fitted_parameter_must_be_large_to_replace_a_fixed_parameter() -> Non
     # With nearly parallel axes, four parameters could become hundreds of metres long.
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40, error=1e-3)
     true = arm.calibrate()
-    told = calibrate(true.written.text, tip="tool0", base="base")
-    J = stacked(told.model, arm.values(arm.q), complete=True)
-    kept, still = list(told.identification.kept), list(told.identification.still)
+    told = calibrate(true.updated_urdf.text, tip="tool0", base="base")
+    J = stack_jacobian(told.model, arm.values(arm.q), full_poses=True)
+    kept, still = list(told.identification.free_parameters), list(told.identification.fixed_parameters)
     shares = np.linalg.lstsq(J[:, kept], J[:, still], rcond=None)
     assert np.abs(J[:, kept] @ shares[0] - J[:, still]).max() < 1e-11
     assert np.abs(shares[0]).max() < 4.0
 
 
 def test_each_fixed_parameter_states_the_parameter_with_the_same_effect() -> None:
-    found = calibrate("ur5", tip="tool0", base="base", fit=["base", "origins"], complete=False)
-    reasons = {str(found.parameters[k]): why for k, why in found.identification.still.items()}
+    found = calibrate("ur5", tip="tool0", base="base", fit=["base", "origins"], full_poses=False)
+    reasons = {str(found.parameters[k]): why for k, why in found.identification.fixed_parameters.items()}
     assert reasons["shoulder_pan_joint rz"] == "same effect as base rz"
     assert reasons["elbow_joint z"] == "same effect as shoulder_lift_joint z"
     assert reasons["wrist_3_link-tool0_fixed_joint rx"] == "no effect on the measured numbers"
@@ -241,7 +245,7 @@ def test_a_joint_without_motion_in_the_poses_is_reported() -> None:
     found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 26
     words = "26 parameters are identifiable from these poses; more varied poses would identify 4 more: "
-    assert any(words in line for line in doubts(found))
+    assert any(words in line for line in list_warnings(found))
 
 
 @pytest.mark.slow
@@ -251,6 +255,6 @@ def test_poorly_observable_parameters_are_reported() -> None:
     q[:, 2] = 0.4 + 1e-3 * q[:, 2]
     found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 30
-    (line,) = doubts(found)
+    (line,) = list_warnings(found)
     assert line.startswith("poorly observable: elbow_joint")
-    assert not doubts(arm.calibrate())
+    assert not list_warnings(arm.calibrate())

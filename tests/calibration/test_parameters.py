@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.calibration.arms import BRANCHED
-from urdfkin.calibration.parameters import CalibrationModel, table_model, urdf_model
+from urdfkin.calibration.parameters import CalibrationModel, make_table_model, make_urdf_model
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import rotation_with_z_axis
@@ -70,9 +70,9 @@ def six(model: CalibrationModel, where: str, moved: dict[int, Number]) -> Pose:
     """Return the motion by the six parameters of a joint, the base or the tool."""
     push: Pose = IDENTITY, ZERO
     for k, parameter in enumerate(model.chain.parameters):
-        if parameter.where == where and parameter.what != "gain":
-            axis = "xyz".index(parameter.what[-1])
-            push = joined(push, elementary(parameter.what[0] == "r", axis, moved.get(k, 0)))
+        if parameter.element == where and parameter.name != "gain":
+            axis = "xyz".index(parameter.name[-1])
+            push = joined(push, elementary(parameter.name[0] == "r", axis, moved.get(k, 0)))
     return push
 
 
@@ -82,10 +82,10 @@ def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fift
     base: str, tip: str
 ) -> None:
     robot = load(BRANCHED, verify=False)
-    model = urdf_model(robot.tree, tip, base, ("base", "tool", "origins", "gains"))
+    model = make_urdf_model(robot.tree, tip, base, ("base", "tool", "origins", "gains"))
     q = robot.sample(1, 3)[0]
     joints = read_exact(robot.urdf, robot.tree)
-    numbers = {(p.where, p.what): k for k, p in enumerate(model.chain.parameters)}
+    numbers = {(p.element, p.name): k for k, p in enumerate(model.chain.parameters)}
 
     def moved_joint(name: str, own: ExactJoint, moved: dict[int, Number]) -> ExactJoint:
         joint = robot.tree.joints[robot.tree.joint_index(name)]
@@ -104,11 +104,11 @@ def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fift
         return joined(joined(six(model, "base", moved), way), six(model, "tool", moved))
 
     values = model.coupling.values(model.coupling.select(robot.tree, q[np.newaxis]))
-    columns = model.chain.columns(values)[1][0]
-    bound = model.chain.rounding(values)
+    columns = model.chain.poses_and_jacobian(values)[1][0]
+    bound = model.chain.rounding_bound(values)
     difference = np.abs(columns - quotients(model, place))
     assert difference[:3].max() < bound
-    assert difference[3:].max() < bound / model.chain.size
+    assert difference[3:].max() < bound / model.chain.characteristic_length
 
 
 def table(convention: DHConvention) -> DHTable:
@@ -129,8 +129,8 @@ def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fif
     convention: DHConvention,
 ) -> None:
     dh = table(convention)
-    model = table_model(dh, ("base", "tool", "origins", "gains"))
-    names = [(p.where, p.what) for p in model.chain.parameters]
+    model = make_table_model(dh, ("base", "tool", "origins", "gains"))
+    names = [(p.element, p.name) for p in model.chain.parameters]
     assert [where for where, what in names if what == "beta"] == ["two", "four"]
     numbers, q = {name: k for k, name in enumerate(names)}, np.array([[0.3, -0.5, 0.2, 1.1]])
 
@@ -152,7 +152,7 @@ def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fif
         return joined(T, six(model, "tool", moved))
 
     values = dh.coupling.values(q)
-    poses, columns = model.chain.columns(values)
+    poses, columns = model.chain.poses_and_jacobian(values)
     np.testing.assert_allclose(poses, dh.placement(q), atol=1e-14)
     difference = np.abs(columns[0] - quotients(model, place))
-    assert difference.max() < model.chain.rounding(values)
+    assert difference.max() < model.chain.rounding_bound(values)

@@ -14,7 +14,7 @@ from tests.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.calibration.test_parameters import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
-from urdfkin.calibration.parameters import table_model
+from urdfkin.calibration.parameters import make_table_model
 from urdfkin.dh.table import DHConvention
 from urdfkin.model.tree import FloatArray
 
@@ -39,13 +39,13 @@ def arm(name: str) -> Bench:
 
 
 def fitted(
-    name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None, **how: Any
+    name: str, q: FloatArray, *, full_poses: bool = True, fit: list[str] | None = None, **how: Any
 ) -> Calibration:
     true = arm(name)
     T = pose(1, 2.0) @ true.noisy(1e-4, 2e-4, 3) @ pose(2, 0.2)
     wanted = ALL if fit is None else fit
     poses = T if "base" in wanted else true.noisy(1e-4, 2e-4, 3)
-    return true.calibrate(poses if complete else poses[:, :3, 3], q, fit=wanted, **how)
+    return true.calibrate(poses if full_poses else poses[:, :3, 3], q, fit=wanted, **how)
 
 
 def refused(name: str, q: FloatArray, **how: Any) -> str:
@@ -58,16 +58,16 @@ def reason(name: str, q: FloatArray, **how: Any) -> str:
     return refused(name, q, **how).split("likeliest reason: ")[1]
 
 
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("full_poses", [True, False])
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
 @pytest.mark.parametrize("name", NAMES)
 def test_joint_angles_in_degrees_are_identified_as_the_mistake(
-    name: str, fit: list[str], complete: bool
+    name: str, fit: list[str], full_poses: bool
 ) -> None:
     true = arm(name)
     slides = [joint == "two" for joint in true.robot.coordinate_names]
     q = np.where(slides, true.q, np.degrees(true.q))
-    assert reason(name, q, fit=fit, complete=complete).startswith("joint angles are in degrees")
+    assert reason(name, q, fit=fit, full_poses=full_poses).startswith("joint angles are in degrees")
 
 
 def test_values_that_are_all_multiplied_by_180_over_pi_are_identified_as_the_mistake() -> None:
@@ -75,11 +75,11 @@ def test_values_that_are_all_multiplied_by_180_over_pi_are_identified_as_the_mis
     assert "multiplied by 180/pi" in reason(name, np.degrees(arm(name).q))
 
 
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("full_poses", [True, False])
 @pytest.mark.parametrize("by", [1, -1, 2])
 @pytest.mark.parametrize("name", NAMES)
-def test_shifted_rows_of_q_are_identified_as_the_mistake(name: str, by: int, complete: bool) -> None:
-    said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
+def test_shifted_rows_of_q_are_identified_as_the_mistake(name: str, by: int, full_poses: bool) -> None:
+    said = reason(name, np.roll(arm(name).q, by, axis=0), full_poses=full_poses)
     rows = "one row" if abs(by) == 1 else "2 rows"
     way = "later" if by > 0 else "earlier"
     words = f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
@@ -115,7 +115,7 @@ def test_a_gain_or_a_tilted_axis_does_not_hide_a_wrong_sign() -> None:
     # A reversed axis fits measured positions exactly.
     q = arm("through the trunk").q.copy()
     q[:, arm("through the trunk").robot.coordinate_names.index("three")] *= -1.0
-    said = refused("through the trunk", q, complete=False, fit=["origins"])
+    said = refused("through the trunk", q, full_poses=False, fit=["origins"])
     assert "'three' is wrong" in said
 
 
@@ -128,9 +128,9 @@ def test_prismatic_joints_in_millimetres_are_identified_as_the_mistake() -> None
 
 def test_data_for_a_table_are_checked_like_data_for_a_robot() -> None:
     drawn = table(DHConvention.STANDARD)
-    model = table_model(drawn, ("origins",))
+    model = make_table_model(drawn, ("origins",))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
-    T = model.chain.poses(q, model.chain.start + 1e-3)
+    T = model.chain.poses(q, model.chain.initial_values + 1e-3)
     calibrate(drawn, q, T)
     with pytest.raises(ImplausibleError, match="q is shifted by one row"):
         calibrate(drawn, np.roll(q, 1, axis=0), T)
@@ -138,9 +138,9 @@ def test_data_for_a_table_are_checked_like_data_for_a_robot() -> None:
         calibrate(drawn, q * [1.0, -1.0, 1.0, 1.0], T)
 
 
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("full_poses", [True, False])
 @pytest.mark.parametrize("name", NAMES)
-def test_good_data_are_never_refused(name: str, complete: bool) -> None:
+def test_good_data_are_never_refused(name: str, full_poses: bool) -> None:
     text, tip, base = ARMS[name]
     for error, noise, poses, seed in [
         (2e-3, 0.0, 20, 0),
@@ -152,7 +152,7 @@ def test_good_data_are_never_refused(name: str, complete: bool) -> None:
         true = bench(text, ("origins",), tip, base, poses=poses, error=error, seed=seed)
         T = true.noisy(noise, noise, seed)
         for fit in (["origins"], ALL):
-            found = true.calibrate(T if complete else T[:, :3, 3], fit=fit)
+            found = true.calibrate(T if full_poses else T[:, :3, 3], fit=fit)
             assert not found.plausibility.objections
 
 
@@ -198,14 +198,14 @@ def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
     true, q = replace(arm("ur5"), truth=truth), arm("ur5").robot.sample(60, 5)
     T = true.poses(q)
     T[:, :3, 3] += 5e-5 * np.random.default_rng(1).standard_normal((60, 3))
-    few, every = true.calibrate(T, q), true.calibrate(T, q, every=True)
+    few, every = true.calibrate(T, q), true.calibrate(T, q, write_all=True)
     assert len(every.written_parameters) == every.identification.rank
     assert len(few.written_parameters) <= 4
-    assert (present(every.fitted).at == present(few.fitted).at).all()
+    assert (present(every.full_fit).parameter_values == present(few.full_fit).parameter_values).all()
     # The written parameters move the tip as the true ones do, within the noise.
-    found = few.model.chain.poses(true.values(q), present(few.written_fit).at)
+    found = few.model.chain.poses(true.values(q), present(few.written_fit).parameter_values)
     assert np.abs(found - true.poses(q)).max() < 1e-4
-    assert set(few.origins) == {few.parameters[k].where for k in few.written_parameters}
+    assert set(few.origins) == {few.parameters[k].element for k in few.written_parameters}
 
 
 CATALOGUE_ARMS = (
@@ -219,7 +219,7 @@ CATALOGUE_ARMS = (
 @given(
     name=st.sampled_from(CATALOGUE_ARMS),
     mistake=st.sampled_from(("none", "none", "degrees", "rows one later", "rows one earlier")),
-    complete=st.booleans(),
+    full_poses=st.booleans(),
     fit=st.sampled_from((["origins"], ALL)),
     poses=st.integers(25, 60),
     error=st.floats(-5.0, -2.5),
@@ -227,7 +227,14 @@ CATALOGUE_ARMS = (
     seed=st.integers(0, 10**6),
 )
 def test_random_good_data_are_verified_and_random_wrong_data_refused(
-    name: str, mistake: str, complete: bool, fit: list[str], poses: int, error: float, noise: float, seed: int
+    name: str,
+    mistake: str,
+    full_poses: bool,
+    fit: list[str],
+    poses: int,
+    error: float,
+    noise: float,
+    seed: int,
 ) -> None:
     robot = urdfkin.load(name)
     tip, base = robot.tip_frame, robot.base_frame
@@ -235,7 +242,7 @@ def test_random_good_data_are_verified_and_random_wrong_data_refused(
     T = true.noisy(10.0**noise, 10.0**noise, seed)
     q = np.degrees(true.q) if mistake == "degrees" else true.q
     q = np.roll(q, {"rows one later": 1, "rows one earlier": -1}.get(mistake, 0), axis=0)
-    measured = T if complete else T[:, :3, 3], q
+    measured = T if full_poses else T[:, :3, 3], q
     if mistake == "none":
         found = calibrate(robot, *measured[::-1], tip=tip, base=base, fit=fit)
         assert present(found.certificate).verified

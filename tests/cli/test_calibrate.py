@@ -9,7 +9,7 @@ import pytest
 from tests.calibration.arms import BRANCHED, bench
 from tests.calibration.test_parameters import table
 from tests.cli.running import good, urdfkin
-from urdfkin.calibration.parameters import table_model
+from urdfkin.calibration.parameters import make_table_model
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table
 from urdfkin.dh.table import DHConvention
@@ -54,8 +54,8 @@ def test_an_implausible_calibration_is_written_only_with_force(tmp_path: Path) -
 
 def test_the_calibration_of_a_table_file_writes_a_table(tmp_path: Path) -> None:
     drawn = table(DHConvention.STANDARD)
-    model = table_model(drawn, ("origins",))
-    truth = model.chain.start + 1e-3
+    model = make_table_model(drawn, ("origins",))
+    truth = model.chain.initial_values + 1e-3
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 4))
     (tmp_path / "arm.toml").write_text(export(drawn, "toml"))
     np.savez(tmp_path / "poses.npz", q=q, T=model.chain.poses(q, truth))

@@ -101,7 +101,7 @@ MISTAKES = {
     "velocity panda --q '0 0 0 0 0 0 0 0 0'": "robot.from_pinocchio(q, mimic=False) converts it to ",
     "velocity panda --q ready --v neutral,panda_joint1=1mm/s": "--v, panda_joint1: wrong unit",
     "calibrate ur5 --noise 1,1": "--noise does nothing without --poses",
-    "calibrate ur5 --drop-odd": "--drop-odd does nothing without --poses",
+    "calibrate ur5 --drop-outliers": "--drop-outliers does nothing without --poses",
     "calibrate ur5 --radians": "--radians does nothing without --poses",
     "calibrate ur5 --all": "--all does nothing without --poses",
     "calibrate ur5 --force": "--force does nothing without --poses",

@@ -135,7 +135,13 @@ def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
 # -- progress ----------------------------------------------------------------------------------------
 
 STANDING = CampaignProgress(
-    robots_done=2, robots=68, chunks_done=30, chunks=544, chunks_kept=10, failures=0, label="panda"
+    robots_done=2,
+    robots=68,
+    chunks_done=30,
+    chunks=544,
+    chunks_from_earlier_run=10,
+    failures=0,
+    label="panda",
 )
 
 

@@ -38,7 +38,7 @@ from urdfkin.model.mechanisms.upper_bound import (
     upper_bounds,
 )
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.same import where
+from urdfkin.report.same import configuration_text
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 
@@ -268,8 +268,8 @@ def test_the_worst_configuration_names_a_joint_that_is_independent_only_in_b() -
     q = {"j1": worst.q_a[0], "j2": worst.q_b[1]}
     apart = b.placement(q, "tool")[:3, 3] - a.placement({"j1": q["j1"]}, "tool")[:3, 3]
     assert np.linalg.norm(apart) == pytest.approx(worst.lower)
-    assert where(found, worst) == f"j1 {q['j1']:.6g} rad, j2 of B {q['j2']:.6g} rad"
-    assert "of B" not in where(turned, present(turned.worst))
+    assert configuration_text(found, worst) == f"j1 {q['j1']:.6g} rad, j2 of B {q['j2']:.6g} rad"
+    assert "of B" not in configuration_text(turned, present(turned.worst))
 
 
 @pytest.mark.slow

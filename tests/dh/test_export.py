@@ -18,7 +18,7 @@ from tests.random_chains import configurations, rotation, shift
 from urdfkin.dh import FORMATS, dh_table, export, table_from_rows, units_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.tree import KinematicTree, Mimic
-from urdfkin.view.dh_drawing import drawing, row_corners
+from urdfkin.view.dh_drawing import draw_table_svg, row_corners
 
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0) @ rotation("z", 0.4)
 NEAR = shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4)
@@ -178,7 +178,7 @@ def test_snapped_values_are_listed_with_rows_and_effect() -> None:
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     pytest.importorskip("matplotlib")
-    root = ET.fromstring(drawing(dh_table(PLAIN_ARM, "tip", convention=convention)))
+    root = ET.fromstring(draw_table_svg(dh_table(PLAIN_ARM, "tip", convention=convention)))
     assert root.tag.endswith("svg")
     written = "".join("".join(node.itertext()) for node in root.iter() if node.tag.endswith("text"))
     for name in ("j1", "j2", "j3", "tip", f"{convention} Denavit-Hartenberg frames"):
@@ -191,15 +191,15 @@ def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None
 def test_equal_tables_give_equal_drawings() -> None:
     pytest.importorskip("matplotlib")
     table = dh_table(arm(LINK, LINK), "tip")
-    assert drawing(table) == drawing(table)
-    assert drawing(table) != drawing(table, [0.5, 0.5])
+    assert draw_table_svg(table) == draw_table_svg(table)
+    assert draw_table_svg(table) != draw_table_svg(table, [0.5, 0.5])
 
 
 def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
     pytest.importorskip("matplotlib")
-    assert "<svg" in drawing(dh_table(TREES["nothing moves"], "tip"))
+    assert "<svg" in draw_table_svg(dh_table(TREES["nothing moves"], "tip"))
     with pytest.raises(InputError, match="needs exactly one configuration"):
-        drawing(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
+        draw_table_svg(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
 
 
 @pytest.mark.parametrize(("convention", "beta"), [("standard", 0.0), ("standard", 0.3), ("modified", 0.0)])

@@ -307,8 +307,8 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
     lock = {"panda_joint7": 0.6, "panda_finger_joint1": 0.02}
     locked, q = whole.locked(lock), whole.locked(lock).sample(40)
     T = true.locked(lock).placement(q, "panda_leftfinger")
-    found = urdfkin.calibrate(locked, q, T, tip="panda_leftfinger", every=True)
-    written = urdfkin.load(found.written.text)
+    found = urdfkin.calibrate(locked, q, T, tip="panda_leftfinger", write_all=True)
+    written = urdfkin.load(found.updated_urdf.text)
     full = np.insert(np.concatenate((q, np.full((40, 1), 0.02)), axis=1), 6, 0.6, axis=1)
     assert np.abs(written.placement(full, "panda_leftfinger") - T).max() < 1e-9
 

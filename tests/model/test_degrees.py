@@ -139,4 +139,4 @@ def test_calibrate_refuses_degrees_even_with_force_unless_radians_is_true(ur5: R
         assert "radians=True" in str(caught.value)
     turns = q + 4.0 * math.pi  # whole turns, outside the limits
     found = urdfkin.calibrate(ur5, turns, T, tip="tool0", fit=["offsets"], radians=True)
-    assert found.fitted is not None
+    assert found.full_fit is not None

@@ -61,7 +61,7 @@ def failing() -> Document:
     broken |= {"joints": [], "frames": [], "chains": [], "results": 0, "timings": None}
     document["robots"].append(broken)
     document["sha256"].append(None)
-    document |= {"asked": 3, "verdict": "disagrees"}
+    document |= {"robots_requested": 3, "verdict": "disagrees"}
     document["reason"] = "1 of 3 robots disagrees, 1 of 3 robots has bad input"
     return document
 
@@ -74,7 +74,7 @@ def make_infinite(check: ReportedCheck, index: int, frame: str) -> None:
     check["worst_by_subject"][index] = None
     edges, case = HISTOGRAM_EDGES.tolist(), present(check["worst_case"])
     case |= {"frame": frame, "disagreement": None}
-    check |= {"failed": 3, "worst": None, "share_of_bound": None}
+    check |= {"failed": 3, "worst": None, "bound_ratio": None}
     check["median"], check["p99"] = (percentile(check["histogram"], edges, math.inf, x) for x in (50.0, 99.0))
 
 

@@ -15,7 +15,7 @@ from tests.reading import present
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile, months_runs, saved
 from urdfkin.report.history import as_html as history_page
-from urdfkin.report.history import history
+from urdfkin.report.history import read_history
 from urdfkin.report.html import as_html
 
 pytestmark = [pytest.mark.long, pytest.mark.browser]
@@ -34,7 +34,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     (folder / "runs").mkdir()
     for i, report in enumerate([*months_runs(), hostile()]):
         saved(folder / "runs" / f"{i}.json", report)
-    texts["history"] = history_page(history([folder / "runs"]))
+    texts["history"] = history_page(read_history([folder / "runs"]))
     texts["same"] = audit_pages.comparison("ur5_limited", 1e-3)
     for name, text in texts.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")

@@ -222,7 +222,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     document, (dangerous, plain) = hostile(), hostile()["robots"]
     document["robots"] = [plain | {"source": f"fleet/{i:04}.urdf"} for i in range(2000)]
     document["robots"][7] = dangerous
-    document["asked"] = 2000
+    document["robots_requested"] = 2000
     folder = tmp_path_factory.mktemp("fleet")
     (folder / "fleet-robots").mkdir()
     made = dict[bool, dict[str, Any]]()

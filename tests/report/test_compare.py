@@ -77,7 +77,7 @@ def test_growth_above_the_factor_and_above_a_single_rounding_is_a_regression(
 
 def test_a_failed_run_and_fewer_samples_are_regressions() -> None:
     new = arms()
-    new["asked"] = 3
+    new["robots_requested"] = 3
     line = "outcome: passed -> not passed, 1 of 3 robots without a report"
     assert (True, line) in words(arms(), new)
     assert compare(new, arms()).exit_code == 0
@@ -151,8 +151,8 @@ def test_a_ratio_to_the_bound_above_a_tenth_that_grows_by_more_than_the_factor_i
     grown = (0.2, 0.41), (0.04, 0.11), (0.2, None)
     for share_old, share_new in (*grown, (0.2, 0.39), (0.01, 0.099)):
         old, new = arms(), arms()
-        old["robots"][0]["checks"][0]["share_of_bound"] = share_old
-        new["robots"][0]["checks"][0]["share_of_bound"] = share_new
+        old["robots"][0]["checks"][0]["bound_ratio"] = share_old
+        new["robots"][0]["checks"][0]["bound_ratio"] = share_new
         regression = (share_old, share_new) in grown
         assert bool(compare(old, new).regressions) is regression, (share_old, share_new)
 

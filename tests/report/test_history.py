@@ -11,8 +11,8 @@ from tests.markup import Page
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on, saved
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
-from urdfkin.report.history import as_html, changes, document, history, marks
-from urdfkin.report.html import when
+from urdfkin.report.history import as_html, document, list_changes, read_history, verdict_marks
+from urdfkin.report.html import format_date
 from urdfkin.validation.campaign import validate
 
 
@@ -25,12 +25,12 @@ def month(tmp_path: Path) -> Path:
 
 
 def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
-    found = history([month])
+    found = read_history([month])
     assert [run["started"][8:10] for run in found.runs] == [f"{day:02}" for day in range(1, 9)]
     assert [Path(run["file"]).stem for run in found.runs] == list("76543210")
     assert [run["verdict"] for run in found.runs] == ["verified"] * 4 + ["disagrees"] + ["verified"] * 3
     saved(month / "latest.json", months_runs()[-1])
-    found = history([month])
+    found = read_history([month])
     assert len(found.runs) == 8
     assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
     assert found.exit_code == 0
@@ -49,13 +49,13 @@ def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
     ],
 )
 def test_a_page_states_a_start_time_in_utc(started: str, words: str) -> None:
-    assert when(started) == words
+    assert format_date(started) == words
 
 
 def test_a_history_states_start_times_in_utc(tmp_path: Path) -> None:
     saved(tmp_path / "a.json", arms() | {"started": "2026-11-28T01:30:00+02:00"})
     saved(tmp_path / "b.json", arms() | {"started": "2026-11-27T20:00:00-05:00"})
-    found = history([tmp_path])
+    found = read_history([tmp_path])
     text, page = document(found).text(), as_html(found)
     for date in ("2026-11-27 23:30", "2026-11-28 01:00"):
         assert date in text
@@ -64,20 +64,22 @@ def test_a_history_states_start_times_in_utc(tmp_path: Path) -> None:
 
 
 def test_the_history_of_a_robot_has_a_point_for_each_run_with_the_robot(month: Path) -> None:
-    found = history([month])
-    assert {name: marks(found, points) for name, points in found.robots.items()} == {
+    found = read_history([month])
+    assert {name: verdict_marks(found, points) for name, points in found.robots.items()} == {
         "panda": "✓✓✓✓✗✓✓✓", "ur5": "✓✓✓✓✓✓✓✓", "broken.urdf": "····✗···",
     }  # fmt: skip
     point = found.robots["panda"][4]
-    assert (point["verdict"], point["failed"], point["worst"], point["share_of_bound"]) == (
+    assert (point["verdict"], point["failed"], point["worst"], point["bound_ratio"]) == (
         "disagrees", 3, None, None,
     )  # fmt: skip
     assert [point["warnings"] for point in found.robots["panda"]] == [0, 0, 28, 28, 0, 0, 0, 0]
 
 
 def test_changes_have_the_index_of_the_run_and_regressions_come_first(month: Path) -> None:
-    found = history([month])
-    rows = [(run, change["robot"], change["what"], change["regression"]) for run, change in changes(found)]
+    found = read_history([month])
+    rows = [
+        (run, change["robot"], change["what"], change["regression"]) for run, change in list_changes(found)
+    ]
     assert rows[0] == (5, "broken.urdf", "robot", True)
     assert (5, None, "version of pin", False) in rows
     assert (5, "ur5", "joint shoulder_pan_joint, axis", False) in rows
@@ -93,7 +95,7 @@ def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
     monkeypatch.setattr(module, "SHOWN", 3)
-    found = history([month])
+    found = read_history([month])
     some, everything = document(found).text(), document(found, all_=True).text()
     assert "13 more: --all shows them" in some
     assert ("2026-11-05" in some, "2026-11-05" in everything) == (False, True)
@@ -103,7 +105,7 @@ def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
     before, after = run_on(1, arms()), run_on(2, arms())
     after["robots"][0]["source"] = "robots/panda.urdf"
-    found = history([saved(tmp_path / "a.json", before), saved(tmp_path / "b.json", after)])
+    found = read_history([saved(tmp_path / "a.json", before), saved(tmp_path / "b.json", after)])
     assert [point["source"] for point in found.robots["robots/panda.urdf"]] == ["panda", "robots/panda.urdf"]
     assert "panda" not in found.robots
     page = as_html(found)
@@ -114,7 +116,7 @@ def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> No
 def test_a_store_counts_as_a_run_in_the_history(tmp_path: Path) -> None:
     validate("planar_two_link", samples=2, store=tmp_path / "nightly" / "store")
     saved(tmp_path / "nightly" / "a.json", run_on(1, arms()))
-    found = history([tmp_path / "nightly"])
+    found = read_history([tmp_path / "nightly"])
     assert {run["file"] for run in found.runs} == {str(tmp_path / "nightly" / x) for x in ("store", "a.json")}
     assert found.exit_code == 0
 
@@ -141,15 +143,15 @@ def test_unusable_files_are_listed_and_the_other_files_are_used(month: Path) -> 
 def test_the_number_and_size_of_reports_are_limited(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 7)
     with pytest.raises(InputError, match="more than 7 files"):
-        history([month])
+        read_history([month])
     monkeypatch.setattr(module, "MOST_FILES", 8)
     monkeypatch.setattr(module, "MOST_RUNS", 7)
     with pytest.raises(InputError, match="more than 7 reports"):
-        history([month])
+        read_history([month])
     monkeypatch.undo()
     monkeypatch.setattr(module, "MOST", 1000)
     with pytest.raises(InputError, match=r"no report to show: found .*too large"):
-        history([month])
+        read_history([month])
 
 
 def test_a_history_without_a_report_is_an_error_with_the_remedy(tmp_path: Path) -> None:
@@ -163,7 +165,7 @@ def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path
     reports = [run_on(1, hostile()), run_on(2, hostile())]
     reports[1]["robots"][1]["source"] = '"><img src=x onerror=hacked()>'
     page = as_html(
-        history([saved(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command"
+        read_history([saved(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command"
     )
     elements = Page(page).elements
     assert {tag for tag, _ in elements}.isdisjoint({"script", "img", "iframe", "object", "form", "base"})

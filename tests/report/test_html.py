@@ -77,7 +77,7 @@ def test_tables_agree_on_the_page_if_the_ratio_to_the_bound_is_at_most_one() -> 
     chains = [chain for robot in document["robots"] for chain in robot["chains"]]
     assert as_html(document).count("Both tables agree with Pinocchio") == len(chains) > 0
     for chain in chains[1:]:
-        chain["share_of_bound"] = 1.01
+        chain["bound_ratio"] = 1.01
     text = as_html(document)
     assert text.count("Both tables agree with Pinocchio") == 1
     assert text.count("The tables disagree with Pinocchio") == len(chains) - 1
@@ -97,7 +97,7 @@ def test_plots_pictures_and_tables_are_accessible() -> None:
 
 
 def test_a_page_without_matplotlib_states_that_plots_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(html_module, "installed", lambda: False)
+    monkeypatch.setattr(html_module, "has_matplotlib", lambda: False)
     text = as_html(arms())
     assert "pip install &#39;matplotlib&gt;=3.10.7&#39;" in text
     assert 'class="plot"' not in text
@@ -172,12 +172,12 @@ def test_the_colour_of_the_heat_map_depends_on_the_ratio_to_the_bound() -> None:
     model = present(robot["model"])
     _, rows = pages.heat_map(robot, model)
     edges = (0.0, *pages.HEAT_STEPS)
-    largest = max(check["share_of_bound"] or 0.0 for check in robot["checks"])
+    largest = max(check["bound_ratio"] or 0.0 for check in robot["checks"])
     steps = [cell.step for _, cells in rows for cell in cells if cell.text]
     assert max(steps) == sum(largest > edge for edge in edges)
     for check in robot["checks"]:
         check["worst_by_subject"] = [0.5 * (check["bound"][0] or 0.0) for _ in check["worst_by_subject"]]
-        check["share_of_bound"] = 0.5
+        check["bound_ratio"] = 0.5
     _, rows = pages.heat_map(robot, model)
     assert {cell.step for _, cells in rows for cell in cells if cell.text} == {sum(e < 0.5 for e in edges)}
 

@@ -15,7 +15,7 @@ from urdfkin.errors.escape import markdown_code, markdown_text
 from urdfkin.report.compare import compare, document
 from urdfkin.report.junit import as_junit
 from urdfkin.report.listing import print_document
-from urdfkin.report.markdown import LIMIT, as_markdown, fenced
+from urdfkin.report.markdown import LIMIT, as_markdown, fence_code
 from urdfkin.report.terminal import print_report
 from urdfkin.validation.document import Document
 
@@ -42,7 +42,7 @@ def test_names_and_texts_are_escaped_in_markdown_and_a_fence_is_longer_than_back
     assert markdown_code(HOSTILE_ROBOT) in as_markdown(hostile())
     shown = rendered(markdown_text("a|b `c` *d* <e> @f #g [h](i)")).strip().replace("\u2060", "")
     assert shown == "<p>a|b `c` *d* &lt;e&gt; @f #g [h](i)</p>"
-    assert fenced("a ``` b").startswith("````sh\n")
+    assert fence_code("a ``` b").startswith("````sh\n")
 
 
 @pytest.mark.slow

@@ -82,7 +82,7 @@ def test_every_quantity_of_every_frame_agrees_with_pinocchio(robot: Robot) -> No
     report = urdfkin.validate(robot, samples=1).robots[0]
     assert (report.verdict, report.failed) == (ValidationVerdict.VERIFIED, 0)
     frames, moving = len(robot.all_frames), len(robot.joint_names)
-    results = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in QUANTITIES}
+    results = {quantity: sum(stats.results for stats in report.stats_of(quantity)) for quantity in QUANTITIES}
     assert results["placement"] == 4 * frames
     assert results["acceleration"] == 3 * 4 * frames
     assert results["joint jacobian"] == 3 * 4 * moving

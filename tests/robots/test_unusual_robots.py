@@ -29,13 +29,13 @@ def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
     assert (report.verdict, report.failed, report.reason) == (ValidationVerdict.VERIFIED, 0, None)
     frames = len(robot.tree.links) + len(robot.tree.joints)
     moving = [joint for joint in robot.tree.joints if joint.kind.nv]
-    counts = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in QUANTITIES}
+    counts = {quantity: sum(stats.results for stats in report.stats_of(quantity)) for quantity in QUANTITIES}
     assert counts["placement"] == samples * frames
     for quantity in ("velocity", "acceleration", "jacobian", "jacobian rate"):
         assert counts[quantity] == 3 * samples * frames, quantity
     assert counts["joint jacobian"] == 3 * samples * len(moving)
     assert counts["screws"] == samples * sum(joint.kind.nv for joint in moving)
-    assert max(tally.share for tally in report.tallies.values()) < USUAL_SHARE
+    assert max(stats.bound_ratio for stats in report.error_stats.values()) < USUAL_SHARE
 
 
 WITH_ROOT = product(

@@ -17,8 +17,8 @@ from tests.report.documents import arms, failing, hostile, run_on, saved
 from urdfkin.comparison.certificate import SAME, certificate
 from urdfkin.errors import InputError, SourceError
 from urdfkin.report.compare import COMPARISON, compare
-from urdfkin.report.history import HISTORY, history
-from urdfkin.report.reading import checked, read_document
+from urdfkin.report.history import HISTORY, read_history
+from urdfkin.report.reading import check_document, read_document
 from urdfkin.system.documents import DocumentKind, Header, as_data, plain
 from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.validation.campaign import validate
@@ -46,7 +46,7 @@ def _made(name: str) -> str:
         with TemporaryDirectory() as folder:
             for day in (1, 2):
                 saved(Path(folder) / f"{day}.json", run_on(day, arms()))
-            return json.dumps(history([Path(folder)]).as_dict("urdfkin report history"))
+            return json.dumps(read_history([Path(folder)]).as_dict("urdfkin report history"))
     return json.dumps(arms())
 
 
@@ -213,13 +213,13 @@ def test_a_document_with_a_wrong_entry_is_refused(spoil: Any) -> None:
     document = cast("dict[str, Any]", arms())
     spoil(document)
     with pytest.raises(InputError, match=r"does not conform to the layout urdfkin-validation/1: found \$"):
-        checked(document, "results.json")
+        check_document(document, "results.json")
 
 
 def test_a_file_is_read_back_unchanged_and_unknown_entries_are_ignored(tmp_path: Path) -> None:
     document: Any = arms()
     document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
-    assert checked(document, "results.json") == arms()
+    assert check_document(document, "results.json") == arms()
     with pytest.raises(SourceError, match="cannot be read"):
         read_document(tmp_path / "results.json")
     assert read_document(saved(tmp_path / "results.json", hostile())) == hostile()

@@ -46,7 +46,7 @@ ERRORS: dict[str, tuple[Callable[[], None], str]] = {
 
 
 def run_faulty(chunk: Chunk) -> ChunkResult:
-    if chunk.subject.label == "ur5":
+    if chunk.robot_input.label == "ur5":
         fault = os.environ[FAULT]
         if fault in ERRORS:
             ERRORS[fault][0]()

@@ -14,8 +14,8 @@ from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import AccuracyStudy
-from urdfkin.validation.campaign import StoreWarning, stored, validate
-from urdfkin.validation.store import AccuracyResult, FailedStudy, Store, StudySettings, open_store
+from urdfkin.validation.campaign import StoreWarning, read_stored_report, validate
+from urdfkin.validation.store import AccuracyStore, FailedStudy, Store, StudySettings, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 STUDIED = ["planar_two_link", "double_pendulum"]
@@ -65,15 +65,18 @@ def test_an_interrupted_study_resumes_and_gives_the_report_of_one_run(
     again, store = tmp_path / "again.json", str(tmp_path / "s")
     study.interrupted_at = "double_pendulum"
     assert urdfkin(*COMMAND, "--store", store).code == 130
-    assert stored(store).interrupted
+    assert read_stored_report(store).interrupted
     assert "accuracy study: 1 of 2 robots" in urdfkin("report status", store).text
     study.interrupted_at = ""
     assert urdfkin(*COMMAND, "--store", store, "--json", str(again)).code == 2  # because of the missing robot
     assert study.robots == STUDIED
     assert results(again) == expected
     assert expected[1] is None
-    assert not stored(store).interrupted
-    assert json.loads(json.dumps([r["accuracy"] for r in stored(store).as_dict()["robots"]])) == expected
+    assert not read_stored_report(store).interrupted
+    assert (
+        json.loads(json.dumps([r["accuracy"] for r in read_stored_report(store).as_dict()["robots"]]))
+        == expected
+    )
 
 
 @pytest.mark.slow
@@ -89,7 +92,7 @@ def test_other_settings_of_the_study_reuse_no_result_and_keep_the_chunks(
         assert study.robots == STUDIED
     assert sorted(tmp_path.glob("chunks/*/*.chunk")) == chunks
     assert len(list(tmp_path.glob("chunks/*/*.accuracy"))) == 6
-    (first, *_) = stored(store).studies
+    (first, *_) = read_stored_report(store).studies
     assert first is not None
     assert first.moving_base
 
@@ -119,13 +122,13 @@ def test_a_damaged_result_is_reported_and_computed_again(study: Recorder, tmp_pa
         place.write_bytes(content[:-1] if i else content[:60] + bytes([content[60] ^ 1]) + content[61:])
     study.robots = []
     with pytest.warns(StoreWarning, match="is computed again"):
-        assert stored(tmp_path).interrupted
+        assert read_stored_report(tmp_path).interrupted
     again = urdfkin(*COMMAND, "--store", str(tmp_path))
     assert again.err.count("is computed again") == 2
     assert study.robots == STUDIED
     (tmp_path / "accuracy.json").write_text("{}")
     with pytest.warns(StoreWarning, match="cannot be read"):
-        assert stored(tmp_path).studies == ()
+        assert read_stored_report(tmp_path).studies == ()
 
 
 def test_a_failed_study_is_reported_each_time_and_retried_on_request(study: Recorder, tmp_path: Path) -> None:
@@ -135,10 +138,10 @@ def test_a_failed_study_is_reported_each_time_and_retried_on_request(study: Reco
     for _ in range(2):
         assert message in urdfkin(*command).err
     assert study.robots == STUDIED
-    assert not stored(tmp_path).interrupted
+    assert not read_stored_report(tmp_path).interrupted
     study.failing = ""
     assert "no accuracy result" not in urdfkin(*command, "--retry", "failed").err
-    assert None not in stored(tmp_path).studies
+    assert None not in read_stored_report(tmp_path).studies
 
 
 def test_a_text_that_changed_after_the_comparison_is_not_studied(study: Recorder, tmp_path: Path) -> None:
@@ -155,9 +158,9 @@ def test_a_text_that_changed_after_the_comparison_is_not_studied(study: Recorder
 
 def test_a_stored_result_of_a_study_is_read_back_exactly(tmp_path: Path) -> None:
     validate("planar_two_link", samples=0, store=tmp_path)
-    with open_store(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
-        kept = AccuracyResult(store, StudySettings(1, 0, False))
+    with open_store(tmp_path, Store.open_read_only(tmp_path, pytest.fail).manifest, pytest.fail) as store:
+        kept = AccuracyStore(store, StudySettings(1, 0, False))
         found = accuracy.accuracy_study(load("planar_two_link"), samples=1)
         for each in (found, FailedStudy("why \ud800")):
-            kept.keep(0, each)
-            assert json.dumps(asdict(kept.found(0))) == json.dumps(asdict(each))  # type: ignore[arg-type]
+            kept.write(0, each)
+            assert json.dumps(asdict(kept.read(0))) == json.dumps(asdict(each))  # type: ignore[arg-type]

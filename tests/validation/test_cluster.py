@@ -37,12 +37,12 @@ from urdfkin.errors import InputError
 from urdfkin.system.processes import own_python
 from urdfkin.validation import cluster
 from urdfkin.validation.answer import CRASHED_TWICE
-from urdfkin.validation.campaign import stored, validate
-from urdfkin.validation.cluster import Cluster, ClusterError, connected
+from urdfkin.validation.campaign import read_stored_report, validate
+from urdfkin.validation.cluster import Cluster, ClusterError, connect_cluster
 from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.results import provenance
-from urdfkin.validation.robot_input import RobotInput, subject
+from urdfkin.validation.robot_input import RobotInput, make_robot_input
 
 pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # Dask warns when it shuts down
 
@@ -62,7 +62,7 @@ def undisturbed() -> str:
 def two() -> Iterator[Cluster]:
     """Two local workers."""
     messages: list[str] = []
-    with connected("local:2", messages.append) as found:
+    with connect_cluster("local:2", messages.append) as found:
         assert messages == ["2 workers"]
         yield found
 
@@ -80,7 +80,7 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluste
     ):
         # Dask's workers import the main module again, which could start these tests again.
         patch.delattr(sys.modules["__main__"], "__file__", raising=False)
-        with connected(there.scheduler_address) as found:
+        with connect_cluster(there.scheduler_address) as found:
             yield found, there
 
 
@@ -95,7 +95,7 @@ def test_workers_of_a_local_cluster_open_no_port(two: Cluster) -> None:
 
 def test_a_version_of_dask_that_opens_a_port_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cluster._Portless, "start_http_server")
-    with pytest.raises(ClusterError, match="this version of Dask opens a port"), connected("local:1"):
+    with pytest.raises(ClusterError, match="this version of Dask opens a port"), connect_cluster("local:1"):
         pass
 
 
@@ -110,7 +110,7 @@ def test_a_local_cluster_imports_no_module_from_a_scratch_folder_of_another_user
     for name in ("json.py", "numpy.py", "pinocchio.py"):
         (planted / name).write_text(f"open({str(mark)!r}, 'w').close()")
     before, seen = list(sys.path), dict[str, int]()
-    with connected("local:1") as there:
+    with connect_cluster("local:1") as there:
         assert sys.path == before
         for folder in there._client.run(lambda dask_worker: dask_worker.local_directory).values():
             above = [place for place in Path(folder).parents if tmp_path in place.parents]
@@ -163,7 +163,7 @@ def test_a_cluster_with_the_settings_of_the_page_serves_only_clients_with_the_ke
             nobody_answers(other, 2)
         with dask.config.set(settings_with_key(stranger)):
             nobody_answers(address, 2)
-        with dask.config.set(settings_with_key(tmp_path)), connected(address) as there:
+        with dask.config.set(settings_with_key(tmp_path)), connect_cluster(address) as there:
             there._client.wait_for_workers(1, timeout=60)
             assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
 
@@ -172,27 +172,27 @@ def test_a_cluster_gives_the_results_of_one_process_and_sends_each_robot_once(
     two: Cluster, undisturbed: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     sent: list[str] = []
-    right = RobotInput.carried
+    right = RobotInput.with_text
 
-    def carried(self: RobotInput) -> RobotInput:
+    def with_text(self: RobotInput) -> RobotInput:
         sent.append(self.label)
         return right(self)
 
-    monkeypatch.setattr(RobotInput, "carried", carried)
+    monkeypatch.setattr(RobotInput, "with_text", with_text)
     assert numbers(validate(ROBOTS, samples=SAMPLES, executor=two, store=tmp_path)) == undisturbed
     assert sorted(sent) == sorted(ROBOTS)
-    assert numbers(stored(tmp_path)) == undisturbed
+    assert numbers(read_stored_report(tmp_path)) == undisturbed
 
 
 def test_a_robot_sent_to_a_worker_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text('<robot name="a"><link name="l"/></robot>')
     for source in (str(path), "ur5"):
-        plain = subject(source)
-        carried = pickle.loads(pickle.dumps(plain.carried()))
-        assert isinstance(carried.source, bytes)
+        plain = make_robot_input(source)
+        with_text = pickle.loads(pickle.dumps(plain.with_text()))
+        assert isinstance(with_text.source, bytes)
         path.unlink(missing_ok=True)
-        robot = carried.read()
+        robot = with_text.read()
         assert robot.source == source
         if source == "ur5":
             assert (robot.base_frame, robot.tip_frame) == (plain.read().base_frame, plain.read().tip_frame)
@@ -300,7 +300,7 @@ def nobody_answers(address: str, seconds: float) -> None:
     with (
         dask.config.set({"distributed.comm.timeouts.connect": f"{seconds}s"}),
         pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
-        connected(address),
+        connect_cluster(address),
     ):
         pass
 
@@ -329,7 +329,7 @@ def test_the_number_of_workers_may_change_from_none_to_two_and_one(monkeypatch: 
             else:
                 warnings.append(message)
 
-        with connected(there.scheduler_address.removeprefix("tcp://"), tell) as engine:
+        with connect_cluster(there.scheduler_address.removeprefix("tcp://"), tell) as engine:
             found = numbers(validate(KILLED, samples=400, executor=engine, progress=count))
     assert found == _serial()
     (warning,) = warnings
@@ -350,7 +350,7 @@ def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: p
 
 @pytest.mark.parametrize("word", ["local:", "local:0", "local:-1", "local:two"])
 def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
-    with pytest.raises(InputError, match="N in local:N must be the number"), connected(word):
+    with pytest.raises(InputError, match="N in local:N must be the number"), connect_cluster(word):
         pass
 
 
@@ -379,7 +379,7 @@ def test_a_run_resumes_from_its_store_after_the_scheduler_was_lost(undisturbed: 
             if state.chunks_done >= 3:
                 scheduler.kill()
 
-        with contextlib.suppress(Exception), connected(_address(tmp_path)) as there:
+        with contextlib.suppress(Exception), connect_cluster(_address(tmp_path)) as there:
             there._client.wait_for_workers(1, timeout=60)
             report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=kill)
     reason = str(report.robots[-1].reason)
@@ -392,4 +392,4 @@ def test_a_scheduler_that_is_lost_while_a_result_arrives_is_an_error() -> None:
     gone = Mock(status="finished", **{"result.side_effect": CommClosedError("reset by peer")})
     there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
     with pytest.raises(ClusterError, match="connection to the scheduler is lost"):
-        there._found(gone, None, 1)
+        there._take_answer(gone, None, 1)

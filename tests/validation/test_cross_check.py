@@ -14,11 +14,17 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
-from urdfkin.report.reading import checked, contradictions
+from urdfkin.report.reading import check_document, contradictions
 from urdfkin.validation import chunk
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
-from urdfkin.validation.error_stats import CrossCheck, OraclePair, cross_check, plus, tally
+from urdfkin.validation.error_stats import (
+    CrossCheck,
+    OraclePair,
+    add_cross_checks,
+    compute_error_stats,
+    make_cross_check,
+)
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -31,7 +37,7 @@ SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
 def checked_results(ours: float, pinocchios: float, second_oracle: float) -> CrossCheck:
     """Compare three results with errors in eps."""
     one, two, three = (np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle))
-    return cross_check("mujoco", one, two, three, FIRST, SECOND)
+    return make_cross_check("mujoco", one, two, three, FIRST, SECOND)
 
 
 #: Three results, the outlier, and the number of undecided cases.
@@ -53,7 +59,7 @@ def test_a_result_that_differs_from_two_equal_results_is_the_outlier(
 def test_the_sum_of_cross_checks_does_not_depend_on_the_order() -> None:
     some = [checked_results(*results) for results in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
     (total,) = {reduce(add, order) for order in itertools.permutations(some)}
-    assert plus(None, total) == plus(total, None) == total
+    assert add_cross_checks(None, total) == add_cross_checks(total, None) == total
     assert total.alone == (1, 0, 0)
     assert total.undecided == 1
     assert total.urdfkin.failed == 2
@@ -74,8 +80,8 @@ def test_two_results_agree_up_to_their_bound(
     found, (ours, pinocchios, second_oracle) = checked_results(*results), results
     _, ours_second, theirs_second = agree
     assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_second, not theirs_second)
-    assert found.urdfkin.share_of_bound == abs(ours - second_oracle) / 16
-    assert found.pinocchio.share_of_bound == abs(pinocchios - second_oracle) / 20
+    assert found.urdfkin.bound_ratio == abs(ours - second_oracle) / 16
+    assert found.pinocchio.bound_ratio == abs(pinocchios - second_oracle) / 20
     assert found.urdfkin.worst == abs(ours - second_oracle) / 2
     # If only one pair agrees, the third library is the outlier.
     assert found.alone == (agree[::-1] if sum(agree) == 1 else (0, 0, 0))
@@ -85,15 +91,15 @@ def test_two_results_agree_up_to_their_bound(
 def test_a_sum_of_cross_checks_has_the_largest_disagreement() -> None:
     small, large = checked_results(0, 2, 6), checked_results(0, -4, 14)
     for total in (small + large, large + small):
-        assert total.urdfkin == OraclePair(0, large.urdfkin.worst, large.urdfkin.share_of_bound)
-        assert total.pinocchio == OraclePair(0, large.pinocchio.worst, large.pinocchio.share_of_bound)
+        assert total.urdfkin == OraclePair(0, large.urdfkin.worst, large.urdfkin.bound_ratio)
+        assert total.pinocchio == OraclePair(0, large.pinocchio.worst, large.pinocchio.bound_ratio)
     assert small.urdfkin.worst < large.urdfkin.worst
-    assert small.pinocchio.share_of_bound < large.pinocchio.share_of_bound
+    assert small.pinocchio.bound_ratio < large.pinocchio.bound_ratio
 
 
 def document_of(**changes: Any) -> Document:
     report = validate(arm(), samples=3, oracle="mujoco", **changes)
-    return checked(report.as_dict(), "the report")
+    return check_document(report.as_dict(), "the report")
 
 
 def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,14 +108,14 @@ def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatc
 
     def record_pairs(*arguments: Any) -> CrossCheck:
         pairs.append(arguments[-2:])
-        return cross_check(*arguments)
+        return make_cross_check(*arguments)
 
     def record_bounds(ours: FloatArray, theirs: FloatArray, bound: Bound, *others: Any) -> Any:
         bounds.append(bound)
-        return tally(ours, theirs, bound, *others)
+        return compute_error_stats(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(chunk, "cross_check", record_pairs)
-    monkeypatch.setattr(chunk, "tally", record_bounds)
+    monkeypatch.setattr(chunk, "make_cross_check", record_pairs)
+    monkeypatch.setattr(chunk, "compute_error_stats", record_bounds)
     assert validate(arm(), samples=0, oracle="mujoco").passed
     assert len(pairs) == len(bounds) - 1 > 10  # only Pinocchio has data.J
     for (first, second), bound in zip(pairs, bounds, strict=False):

@@ -1,4 +1,4 @@
-"""A tally counts results outside their bound, contains the worst case, and can be added in any order."""
+"""Error statistics count results outside their bound, contain the worst case, and add in any order."""
 
 import math
 
@@ -7,51 +7,58 @@ import pytest
 
 from tests.reading import present
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
+from urdfkin.validation.error_stats import (
+    HISTOGRAM_EDGES,
+    ErrorStats,
+    Inputs,
+    compute_error_stats,
+    histogram_bin,
+    percentile,
+)
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.comparison import BatchComparison
 
 FRAMES = ("a", "b", "c")
 
 
-def tally_of(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> Tally:
-    """Return the tally of results with errors in eps; the bound is 10 eps."""
+def stats_of(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> ErrorStats:
+    """Return the statistics of results with errors in eps; the bound is 10 eps."""
     ours = np.ones((*units.shape, 6))
     ours[..., 2] += units * EPS
     bound = Bound(np.ones_like(ours), np.full((*units.shape, 1), 10.0))
     inputs: list[Inputs] = [([float(i)], [0.0], [0.0]) for i in range(first, first + len(units))]
-    return tally(ours, np.ones_like(ours), bound, names, first, inputs)
+    return compute_error_stats(ours, np.ones_like(ours), bound, names, first, inputs)
 
 
 @pytest.mark.parametrize(
     ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (30.0, 1), (math.inf, 1), (math.nan, 1)]
 )
 def test_a_result_outside_its_bound_is_counted_and_disagrees(units: float, failed: int) -> None:
-    found = tally_of(np.array([[1.0, units, 2.0]]))
+    found = stats_of(np.array([[1.0, units, 2.0]]))
     assert (found.results, found.failed) == (3, failed)
-    assert (found.share > 1.0) == bool(failed)
-    assert BatchComparison(3, 1.0, found.share, ()).agrees == (not failed)
+    assert (found.bound_ratio > 1.0) == bool(failed)
+    assert BatchComparison(3, 1.0, found.bound_ratio, ()).agrees == (not failed)
     assert present(found.case).frame == "b"
 
 
 @pytest.mark.parametrize("cut", [1, 3, 7])
 def test_tallies_of_any_division_into_samples_and_frames_add_up(cut: int) -> None:
     units = np.round(np.random.default_rng(5).uniform(0.0, 12.0, (8, 3)))
-    whole = tally_of(units)
-    assert tally_of(units[:cut]) + tally_of(units[cut:], cut) == whole
-    assert tally_of(units[cut:], cut) + tally_of(units[:cut]) == whole
+    whole = stats_of(units)
+    assert stats_of(units[:cut]) + stats_of(units[cut:], cut) == whole
+    assert stats_of(units[cut:], cut) + stats_of(units[:cut]) == whole
     for at in (1, 2):
-        left, right = tally_of(units[:, :at], 0, FRAMES[:at]), tally_of(units[:, at:], 0, FRAMES[at:])
-        assert left.beside(right) == whole
-    nothing = tally_of(units[:, :0], 0, ())
-    assert nothing.beside(whole) == whole == whole.beside(nothing)
+        left, right = stats_of(units[:, :at], 0, FRAMES[:at]), stats_of(units[:, at:], 0, FRAMES[at:])
+        assert left.join_frames(right) == whole
+    nothing = stats_of(units[:, :0], 0, ())
+    assert nothing.join_frames(whole) == whole == whole.join_frames(nothing)
 
 
 def test_equal_worst_cases_are_ordered_by_sample_and_then_by_frame() -> None:
     same = np.full((4, 3), 3.0)
     for found in (
-        tally_of(same[2:], 2) + tally_of(same[:2]),
-        tally_of(same[:, :1], 0, ("a",)).beside(tally_of(same[:, 1:], 0, ("b", "c"))),
+        stats_of(same[2:], 2) + stats_of(same[:2]),
+        stats_of(same[:, :1], 0, ("a",)).join_frames(stats_of(same[:, 1:], 0, ("b", "c"))),
     ):
         case = present(found.case)
         assert (case.sample, case.frame, case.q) == (0, "a", (0.0,))
@@ -80,7 +87,7 @@ def test_the_histogram_has_ten_bins_a_decade_and_counts_an_edge_above_it() -> No
 def test_empty_results_agree_and_tallies_of_different_frames_cannot_be_added() -> None:
     nothing = np.zeros((4, 3, 6, 0))
     bound = Bound(nothing, np.ones((4, 3, 1, 1)))
-    found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
-    assert found == Tally(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
+    found = compute_error_stats(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
+    assert found == ErrorStats(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
     with pytest.raises(ValueError, match=r"shorter|longer"):
-        _ = tally_of(np.ones((1, 3))) + tally_of(np.ones((1, 2)), 0, FRAMES[:2])
+        _ = stats_of(np.ones((1, 3))) + stats_of(np.ones((1, 2)), 0, FRAMES[:2])

@@ -258,7 +258,7 @@ def test_the_diagnosis_names_one_wrong_number_and_the_needed_factor() -> None:
 
     found = check("ur5", "jacobian", single)
     check_diagnosis(found, "single precision")
-    how: dict[str, Any] = {"samples": 60, "factor": found.needed_factor * 1.0001}
+    how: dict[str, Any] = {"samples": 60, "factor": found.smallest_factor * 1.0001}
     assert verify_function(single, robot_of("ur5"), "jacobian", frame="tool0", **how).agrees
 
 
@@ -274,14 +274,14 @@ def test_exceptions_and_wrong_shapes_of_a_checked_function_are_counted_as_errors
     assert found.errors == found.samples - found.compared
     messages = {error.message for error in found.first_errors}
     assert {"ValueError: no solution", "shape (2,), expected (6, 6)"} >= messages
-    assert found.share == 0.0
+    assert found.bound_ratio == 0.0
 
 
 def test_numbers_that_are_not_finite_disagree_and_an_exit_of_the_function_is_an_error() -> None:
     found = check("ur5", "jacobian", lambda q: np.full((6, 6), np.nan))
     assert not found.agrees
     assert found.diagnoses == ("63 results are not finite",)
-    assert found.as_dict()["share"] is None
+    assert found.as_dict()["bound_ratio"] is None
 
     def function(q: np.ndarray) -> np.ndarray:
         raise SystemExit(0)
@@ -337,7 +337,7 @@ def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> No
     arm = urdfkin.load("planar_two_link")
     arm.verifier.unverifiable = "a reason"
     found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
-    assert found.oracle_share is None
+    assert found.oracle_bound_ratio is None
     assert "NOT checked" in str(found)
     failures = [case.get("type") for case in junit_of(functions_as_junit([found])).iter("failure")]
     assert failures == ["not verified"]
@@ -456,7 +456,7 @@ def test_a_late_line_of_a_program_is_not_the_answer_to_the_next_request(tmp_path
         *("--timeout", "60", "--format", "json"),
     )
     assert (done.data["compared"], done.data["errors"]) == (5, 1)
-    assert done.data["share"] <= 1.0
+    assert done.data["bound_ratio"] <= 1.0
 
 
 def test_a_program_that_answers_with_errors_gets_all_requests() -> None:

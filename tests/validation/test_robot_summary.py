@@ -35,7 +35,7 @@ def test_the_chains_of_a_catalogue_robot_are_its_limbs_checked_in_both_conventio
     for chain in chains:
         assert chain["samples"] >= 10
         assert 0.0 < chain["worst"] < 50.0
-        assert chain["share_of_bound"] < 1.0
+        assert chain["bound_ratio"] < 1.0
         joints = [row["joint"] for row in chain["standard"]["rows"]]
         assert joints == [row["joint"] for row in chain["modified"]["rows"]]
 
@@ -72,7 +72,7 @@ def test_a_wrong_table_of_one_convention_fails_the_robot(wrong: str, monkeypatch
     (bad,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]
-    assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
+    assert bad["bound_ratio"] > 1.0 > good["bound_ratio"]
     report = validate("ur5", samples=0).robots[0]
     assert (report.failed, report.verdict) == (0, "disagrees")
 
@@ -91,7 +91,7 @@ def test_an_infinite_disagreement_is_null_in_the_document(monkeypatch: pytest.Mo
     text = json.dumps(report.as_dict(), allow_nan=False)
     check = next(c for c in json.loads(text)["robots"][0]["checks"] if c["quantity"] == "placement")
     assert check["worst"] is None
-    assert check["share_of_bound"] is None
+    assert check["bound_ratio"] is None
     assert check["failed"] == check["results"]
 
 
@@ -107,7 +107,7 @@ TEXT = robot_of(
 
 def replay_all(report: RobotReport, stdin: str = "") -> int:
     """Run each command in a robot's report, and return the number of commands."""
-    lines = [line for key in report.tallies if (line := report.replay(key)) is not None]
+    lines = [line for key in report.error_stats if (line := report.replay(key)) is not None]
     for line in lines:
         words = shlex.split(line)
         assert words[0] == "urdfkin"
@@ -126,8 +126,8 @@ def test_the_commands_for_a_text_read_the_text_from_standard_input(root_joint: s
 def test_a_command_computes_the_compared_joint_and_not_a_link_with_the_same_name() -> None:
     robot = urdfkin.load(TEXT)
     report = validate(robot, samples=2).robots[0]
-    key = next(key for key in report.tallies if key[0] == "joint jacobian" and report.replay(key))
-    case, line = present(report.tallies[key].case), present(report.replay(key))
+    key = next(key for key in report.error_stats if key[0] == "joint jacobian" and report.replay(key))
+    case, line = present(report.error_stats[key].case), present(report.replay(key))
     done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
     expected = robot.jacobian(case.q, f"joint:{case.frame}", key[1])
     assert np.allclose(done.data["result"][0], expected, atol=1e-12)

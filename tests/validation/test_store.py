@@ -31,12 +31,12 @@ from urdfkin.validation.answer import (
     pack,
     unpack,
 )
-from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
+from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, read_stored_report, validate
+from urdfkin.validation.chunk import Chunk, Chunking, ChunkResult, run_chunk
 from urdfkin.validation.collector import CampaignProgress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
-from urdfkin.validation.robot_input import subject
+from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.validation.store import Store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
@@ -63,7 +63,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     found: list[tuple[str, int]] = []
 
     def counting(chunk: Chunk) -> ChunkResult:
-        found.append((chunk.subject.label, chunk.index))
+        found.append((chunk.robot_input.label, chunk.index))
         return run_chunk(chunk)
 
     monkeypatch.setattr(answer, "run_chunk", counting)
@@ -95,10 +95,10 @@ def test_a_resumed_run_computes_each_chunk_once_and_gives_the_report_of_one_run(
     undisturbed: str, ran: list[tuple[str, int]], tmp_path: Path
 ) -> None:
     assert interrupt(tmp_path, 2).interrupted
-    assert stored(tmp_path).interrupted
+    assert read_stored_report(tmp_path).interrupted
     assert len(ran) == 2
     for _ in range(2):
-        assert numbers(run_all(tmp_path)) == numbers(stored(tmp_path)) == undisturbed
+        assert numbers(run_all(tmp_path)) == numbers(read_stored_report(tmp_path)) == undisturbed
         assert len(ran) == len(set(ran)) == 7
 
 
@@ -121,7 +121,7 @@ def test_changed_code_reuses_no_result_and_the_digest_covers_all_code_that_compu
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     interrupt(tmp_path)
-    before = Store.reading(tmp_path, pytest.fail).manifest
+    before = Store.open_read_only(tmp_path, pytest.fail).manifest
     changed = results.provenance() | {"code": "0" * 64}
     monkeypatch.setattr("urdfkin.validation.store.provenance", lambda: changed)
     with pytest.raises(InputError, match=r"code \w{12} and 000000000000"):
@@ -144,17 +144,17 @@ def test_changed_code_reuses_no_result_and_the_digest_covers_all_code_that_compu
 
 def test_a_changed_file_is_an_error_and_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
     robot = robot_file(tmp_path / "a.urdf", "a")
-    old = subject(str(robot))
+    old = make_robot_input(str(robot))
     robot_file(robot, "b")
-    for read in (old.read, old.carried):
+    for read in (old.read, old.with_text):
         with pytest.raises(InputError, match="has changed since the validation began"):
             read()
-    assert subject(str(robot)).carried().read().name == "b"
+    assert make_robot_input(str(robot)).with_text().read().name == "b"
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(InputError, match="not empty and is not a store"):
         validate("ur5", samples=0, store=tmp_path)
     with pytest.raises(SourceError):
-        stored(tmp_path)
+        read_stored_report(tmp_path)
 
 
 def test_a_failed_robot_is_retried_on_request_with_a_changed_text(tmp_path: Path) -> None:
@@ -168,7 +168,7 @@ def test_a_failed_robot_is_retried_on_request_with_a_changed_text(tmp_path: Path
     again = validate(robots, samples=0, store=store, retry="failed")
     assert [robot.name for robot in again.robots] == ["a", "mended"]
     assert again.passed
-    assert numbers(stored(store)) == numbers(validate(robots, samples=0))
+    assert numbers(read_stored_report(store)) == numbers(validate(robots, samples=0))
     robot_file(good, "other")
     with pytest.raises(InputError, match="another campaign"):
         validate(robots, samples=0, store=store, retry="failed")
@@ -186,15 +186,15 @@ def test_a_failure_of_the_executor_is_not_stored_as_a_failure_of_the_robot(
 
 
 def result() -> ChunkResult:
-    (chunk,) = chunks(subject("planar_two_link"), 0, 0)
+    (chunk,) = chunks(make_robot_input("planar_two_link"), 0, 0)
     return run_chunk(chunk)
 
 
 def test_a_stored_answer_of_a_worker_is_read_back_exactly() -> None:
     found = result()
-    odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
-    tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
-    other = replace(found, tallies=tallies, summary=None)
+    odd: Any = {"worst": float("inf"), "worst_by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
+    error_stats = {key: replace(stats, **odd) for key, stats in found.error_stats.items()}
+    other = replace(found, error_stats=error_stats, summary=None)
     for each in (found, other, Failure(ValidationVerdict.BAD_INPUT, "no \ud800")):
         again = decode_answer("k", encode_answer("k", each))
         assert json.dumps(_plain(again)) == json.dumps(_plain(each))
@@ -203,7 +203,7 @@ def test_a_stored_answer_of_a_worker_is_read_back_exactly() -> None:
 def _plain(found: Answer) -> Any:
     data = asdict(found)
     if isinstance(found, ChunkResult):
-        data["tallies"] = [(*key, asdict(tally)) for key, tally in found.tallies.items()]
+        data["error_stats"] = [(*key, asdict(stats)) for key, stats in found.error_stats.items()]
     return data
 
 
@@ -213,8 +213,8 @@ def _plain(found: Answer) -> Any:
         lambda body: body.pop("result"),
         lambda body: body["result"].update(samples="many"),
         lambda body: body["result"].update(timings=None),
-        lambda body: body["tallies"][0].pop(),
-        lambda body: body["tallies"][0][1].update(worst="small"),
+        lambda body: body["error_stats"][0].pop(),
+        lambda body: body["error_stats"][0][1].update(worst="small"),
         lambda body: body["result"]["summary"]["model"].pop("joints"),
         lambda body: body["result"]["summary"]["chains"][0].update(samples=-1),
         lambda body: body.update(failure={"verdict": "fine", "reason": "none"}),
@@ -267,13 +267,13 @@ def test_renamed_files_are_reported_and_their_chunks_computed_again(undisturbed:
 def mend(store: Path, message: str, count: int, undisturbed: str) -> None:
     """Read and resume a damaged store; each damaged file is reported and moved to `damaged`."""
     with pytest.warns(StoreWarning, match=message) as told:
-        report = stored(store)
+        report = read_stored_report(store)
     assert len(told) == count
     assert report.interrupted or report.robots[1].verdict == ValidationVerdict.NOT_VERIFIED
     with pytest.warns(StoreWarning, match=message) as told:
         assert numbers(run_all(store)) == undisturbed
     assert len(told) == count
-    assert numbers(stored(store)) == undisturbed
+    assert numbers(read_stored_report(store)) == undisturbed
     assert len(list((store / "damaged").iterdir())) == count
 
 
@@ -288,7 +288,7 @@ MANIFESTS = {
 @pytest.mark.parametrize("content", MANIFESTS)
 def test_a_file_that_is_no_manifest_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_bytes(content)
-    for use in (stored, lambda store: validate("ur5", samples=0, store=store)):
+    for use in (read_stored_report, lambda store: validate("ur5", samples=0, store=store)):
         with pytest.raises(InputError, match=MANIFESTS[content]):
             use(tmp_path)
 
@@ -304,7 +304,7 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
     place.write_text(json.dumps(json.loads(place.read_text()) | {entry: value}))
     words = rf"manifest.json: does not conform .* found \$\.{entry}.*write it again"
     with pytest.raises(InputError, match=words):
-        stored(tmp_path)
+        read_stored_report(tmp_path)
 
 
 # -- shards ------------------------------------------------------------------------------------------
@@ -312,7 +312,7 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
 
 @pytest.mark.parametrize(("robots", "samples", "count"), [(1, 1000, 3), (7, 60, 4), (2, 0, 5), (68, 1000, 9)])
 def test_equal_shards_contain_each_chunk_once(robots: int, samples: int, count: int) -> None:
-    cut = Cut(samples)
+    cut = Chunking(samples)
     shards = [chunks_of_shard(robots, cut, f"{i + 1}/{count}") for i in range(count)]
     for robot in range(robots):
         assert [i for shard in shards for i in shard[robot]] == list(range(len(cut)))
@@ -335,16 +335,16 @@ def test_shards_of_several_machines_can_be_merged_to_the_report_of_one_run(
     whole = tmp_path / "whole"
     early = run("report merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
     assert "chunks missing" in early.text
-    assert stored(whole).interrupted
+    assert read_stored_report(whole).interrupted
     merged = run("report merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
     assert merged.text.endswith("complete\n"), merged.err
-    assert numbers(stored(whole)) == undisturbed
+    assert numbers(read_stored_report(whole)) == undisturbed
 
 
 def test_shards_may_share_a_folder_and_begin_at_the_same_time(undisturbed: str, tmp_path: Path) -> None:
     for i in (2, 1, 3):
         run_all(tmp_path, shard=f"{i}/3")
-    assert numbers(stored(tmp_path)) == undisturbed
+    assert numbers(read_stored_report(tmp_path)) == undisturbed
     # another shard has locked the store, but has not yet written the manifest
     other = tmp_path / "other"
     (other / ".writing" / "1-of-2").mkdir(parents=True)
@@ -356,11 +356,11 @@ def test_shards_may_share_a_folder_and_begin_at_the_same_time(undisturbed: str, 
 def test_samples_do_not_depend_on_the_size_of_the_chunks(
     samples: int, cuts: tuple[int, ...], monkeypatch: Any
 ) -> None:
-    tree = subject("ur5").load().tree
+    tree = make_robot_input("ur5").load().tree
     drawn = []
     for draws in cuts:
-        monkeypatch.setattr(Cut, "_draws", draws)
-        each = [chunk.draw(tree) for chunk in chunks(subject("ur5"), samples, 3)]
+        monkeypatch.setattr(Chunking, "_draws", draws)
+        each = [chunk.draw(tree) for chunk in chunks(make_robot_input("ur5"), samples, 3)]
         drawn.append(np.concatenate([np.hstack((x.q, x.v, x.a)) for x in each]))
     assert all(np.array_equal(drawn[0], other) for other in drawn)
     assert len(drawn[0]) == samples + 3
@@ -371,9 +371,9 @@ def test_samples_do_not_depend_on_the_size_of_the_chunks(
 
 def _peak(chunks_: int) -> int:
     """Return the peak memory while the chunks of a robot are collected, each pair in reverse order."""
-    found, robot = result(), subject("planar_two_link")
-    found = replace(found, tallies=dict(list(found.tallies.items())[:2]))
-    cut = Cut(1000 * chunks_)
+    found, robot = result(), make_robot_input("planar_two_link")
+    found = replace(found, error_stats=dict(list(found.error_stats.items())[:2]))
+    cut = Chunking(1000 * chunks_)
     assert len(cut) == chunks_
     collector = ResultCollector([robot], cut, [range(chunks_)])
     pairs = ((i + 1, i) for i in range(0, chunks_, 2))
@@ -381,7 +381,7 @@ def _peak(chunks_: int) -> int:
     tracemalloc.start()
     for index in itertools.chain.from_iterable(pairs):
         task = Task(0, cut.chunk(robot, 0, index))
-        collector.enter(task, replace(found, samples=task.chunk.configurations))
+        collector.add(task, replace(found, samples=task.chunk.configurations))
         if index % 1000 == 0:  # otherwise, the peak depends on the garbage collector
             gc.collect()
     (report,) = collector.reports()
@@ -397,13 +397,13 @@ def test_memory_does_not_grow_with_samples() -> None:
 
 
 def test_the_sum_of_chunks_does_not_depend_on_the_order_of_arrival() -> None:
-    all_chunks = list(chunks(subject("planar_two_link"), 60, 0))
+    all_chunks = list(chunks(make_robot_input("planar_two_link"), 60, 0))
     results = [run_chunk(chunk) for chunk in all_chunks]
     reports = set()
     for order in itertools.permutations(range(3)):
-        collector = ResultCollector([all_chunks[0].subject], Cut(60), [range(len(results))])
+        collector = ResultCollector([all_chunks[0].robot_input], Chunking(60), [range(len(results))])
         for i in order:
-            collector.enter(Task(0, all_chunks[i]), results[i])
+            collector.add(Task(0, all_chunks[i]), results[i])
         (report,) = collector.reports()
         data = {k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")}
         reports.add(json.dumps(data))
@@ -435,7 +435,7 @@ def test_a_process_killed_at_random_times_loses_no_stored_chunk(undisturbed: str
         assert len(files(tmp_path / "s")) > seen or process.returncode == 2
         seen = len(files(tmp_path / "s"))
     assert _run(tmp_path / "s").returncode == 2
-    assert numbers(stored(tmp_path / "s")) == undisturbed
+    assert numbers(read_stored_report(tmp_path / "s")) == undisturbed
 
 
 @pytest.mark.long
@@ -465,7 +465,7 @@ def test_two_processes_that_begin_together_give_the_report_of_one(undisturbed: s
     both = [subprocess.Popen([*_COMMAND, str(tmp_path / "s")], **how) for _ in range(2)]
     errors = [process.communicate()[1] for process in both]
     assert sum("another process uses this store" in error for error in errors) <= 1
-    assert numbers(stored(tmp_path / "s")) == undisturbed
+    assert numbers(read_stored_report(tmp_path / "s")) == undisturbed
 
 
 def test_a_clock_that_is_set_back_changes_no_result(

@@ -29,7 +29,7 @@ from tests.urdf_standard import Robot, mp
 from tests.urdfs import joint, limit, mimic
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_robot, write_sums
+from urdfkin.validation.vectors import VECTORS, features, file_stem, write_features, write_robot, write_sums
 from urdfkin.verify.adapters import LIBRARIES
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
@@ -99,7 +99,7 @@ def agree(path: Path) -> int:
 
 @pytest.mark.parametrize("name", SOME)
 def test_an_implementation_written_from_the_standard_agrees(name: str, folder: Path) -> None:
-    assert agree(folder / f"{stem(name)}.json") >= 3 * 19
+    assert agree(folder / f"{file_stem(name)}.json") >= 3 * 19
 
 
 @pytest.mark.long
@@ -136,7 +136,7 @@ def own(robot: urdfkin.Robot) -> Callable[..., Any]:
 
 def test_the_errors_of_urdfkin_are_at_most_a_twentieth_of_the_tolerances(folder: Path) -> None:
     for name, feature in features().items():
-        path = folder / f"{stem(name)}.json"
+        path = folder / f"{file_stem(name)}.json"
         answer = own(urdfkin.load(feature.text, verify=False))
         data = document(path)
         for one in results(data):
@@ -262,7 +262,7 @@ def demand_the_tolerances_of_the_page(path: Path) -> None:
 
 @pytest.mark.parametrize("name", features())
 def test_the_formulas_on_the_page_give_every_tolerance(name: str, folder: Path) -> None:
-    demand_the_tolerances_of_the_page(folder / f"{stem(name)}.json")
+    demand_the_tolerances_of_the_page(folder / f"{file_stem(name)}.json")
 
 
 def chained(rng: np.random.Generator, large: bool) -> str:
@@ -394,9 +394,9 @@ def compared(program: Path, *files: Path) -> tuple[int, str]:
 def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth(
     name: str, program: Path, folder: Path, tmp_path: Path
 ) -> None:
-    vectors, answers = folder / f"{stem(name)}.tsv", tmp_path / "answers.tsv"
+    vectors, answers = folder / f"{file_stem(name)}.tsv", tmp_path / "answers.tsv"
     lines = [line.split("\t") for line in vectors.read_text("utf-8").splitlines() if line[0] != "#"]
-    data = document(folder / f"{stem(name)}.json")
+    data = document(folder / f"{file_stem(name)}.json")
 
     def write(rows: Sequence[Sequence[float]]) -> None:
         given = zip((fields for fields in lines if fields[1] != "-"), rows, strict=True)
@@ -469,7 +469,7 @@ def test_files_of_all_features_and_robots_are_equal_if_written_twice(tmp_path: P
 
 def test_features_have_unique_names_and_notes_on_libraries_that_differ() -> None:
     assert len(features()) >= 60
-    names = [stem(name).casefold() for name in (*features(), *catalogue())]
+    names = [file_stem(name).casefold() for name in (*features(), *catalogue())]
     assert len(set(names)) == len(names)
     assert len({feature.data for feature in features().values()}) == len(features())
     table = document(ROOT / "docs" / "libraries.json")["cells"]

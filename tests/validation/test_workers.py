@@ -22,7 +22,7 @@ from urdfkin.urdf.sources import Origin
 from urdfkin.validation import answer, engines, memory, worker_processes
 from urdfkin.validation.answer import Answer
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk, Cut
+from urdfkin.validation.chunk import Chunk, Chunking
 from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.engines import RobotTasks, Task, WorkQueue
 from urdfkin.validation.robot_input import RobotInput
@@ -135,7 +135,7 @@ def test_a_worker_runs_no_file_of_the_current_folder(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.long
 def test_killed_processes_change_no_result(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
+    robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer_chunk
 
     def store_answer(chunk: Chunk) -> Answer:
         found = right(chunk)
@@ -143,7 +143,7 @@ def test_killed_processes_change_no_result(monkeypatch: pytest.MonkeyPatch, tmp_
         (tmp_path / name).write_bytes(pickle.dumps(found))
         return found
 
-    monkeypatch.setattr(engines, "answer", store_answer)
+    monkeypatch.setattr(engines, "answer_chunk", store_answer)
     monkeypatch.setattr(memory, "limit", lambda *_: None)  # the limit is part of a chunk, and would change
     expected = numbers(validate(robots, samples=100))
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.canned_worker")
@@ -167,7 +167,7 @@ def test_killed_processes_change_no_result(monkeypatch: pytest.MonkeyPatch, tmp_
 # -- the queue of tasks ------------------------------------------------------------------------------
 
 
-CUT, NO_ROBOT = Cut(100), RobotInput(b"", Origin(""))
+CUT, NO_ROBOT = Chunking(100), RobotInput(b"", Origin(""))
 
 
 def work(robots: int) -> Iterator[Iterator[Task]]:

@@ -98,9 +98,11 @@ def test_a_new_quantity_is_validated_and_included_in_every_report() -> None:
     report = urdfkin.validate("ur5", samples=4)
     (robot,) = report.robots
     assert report.passed
-    tallies = robot.of("angular velocity")
-    assert len(tallies) == 3
-    assert all(tally.results == 7 * len(robot.frames) and 0.0 < tally.share < 1.0 for tally in tallies)
+    error_stats = robot.stats_of("angular velocity")
+    assert len(error_stats) == 3
+    assert all(
+        stats.results == 7 * len(robot.frames) and 0.0 < stats.bound_ratio < 1.0 for stats in error_stats
+    )
     replay = robot.replay(("angular velocity", "local"))
     assert replay is not None
     assert command(*shlex.split(replay)[1:]).code == 0

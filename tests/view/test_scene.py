@@ -8,9 +8,9 @@ import pytest
 import urdfkin
 from urdfkin.kinematics.rotation import rotation_from_quaternion, rotation_from_rpy
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
-from urdfkin.view.scene import mesh, mesh_file, shapes
+from urdfkin.view.scene import make_mesh, mesh_file, shapes
 from urdfkin.view.stage import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
-from urdfkin.view.viewer import numbers
+from urdfkin.view.viewer import describe_motion
 
 URDF = """<robot name="r">
   <material name="blue"><color rgba="0 0 1 0.5"/></material>
@@ -32,14 +32,14 @@ def test_shapes_have_size_placement_and_colour_and_a_broken_mesh_is_omitted(tmp_
     np.testing.assert_array_equal(box.T_link_shape[:3, 3], [1, 2, 3])
     assert (cylinder.kind, cylinder.size, cylinder.colour) == ("cylinder", (0.5, 2.0), None)
     assert (sphere.kind, sphere.size, sphere.colour) == ("sphere", (0.25,), (1.0, 0.0, 0.0, 1.0))
-    assert missing.missing
-    assert mesh(missing) is None
+    assert missing.is_missing
+    assert make_mesh(missing) is None
     (tmp_path / "x.stl").write_text("solid nothing\nfacet what")
     path = tmp_path / "r.urdf"
     path.write_text(URDF.replace("package://nowhere/x.stl", "x.stl"))
     *_, broken = shapes(urdfkin.load(path))
-    assert not broken.missing
-    assert mesh(broken) is None
+    assert not broken.is_missing
+    assert make_mesh(broken) is None
 
 
 def test_meshes_are_found_by_package_address_file_address_and_relative_path(tmp_path: Path) -> None:
@@ -61,7 +61,7 @@ def test_meshes_are_found_by_package_address_file_address_and_relative_path(tmp_
 def test_every_mesh_of_a_catalogue_robot_is_found(name: str) -> None:
     found = shapes(urdfkin.load(name))
     assert len(found) > 5
-    assert [shape for shape in found if shape.missing] == []
+    assert [shape for shape in found if shape.is_missing] == []
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_a_flat_ellipsoid_is_visible_and_the_text_contains_the_results(x: FrameM
     zero = np.zeros((1, 6))
     shape = velocity_ellipsoid(frame_motion(robot, (zero, zero, zero), "base_link"), 2.0)
     np.testing.assert_array_equal(shape.half, 0.004)
-    words = numbers(x)
+    words = describe_motion(x)
     assert "**✓ verified** by Pinocchio" in words
     assert f"{x.placement[0, 0, 3]:.4g}" in words
 

@@ -25,15 +25,15 @@ from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import parse_finite
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.view.scene import Shape
-from urdfkin.view.server import new_server, opened_page
+from urdfkin.view.server import new_server, open_page
 from urdfkin.view.stage import camera
 from urdfkin.view.viewer import (
     Viewer,
     coordinate_rows,
     fixed_coordinates,
+    format_values,
     missing_words,
     within_limits,
-    written,
 )
 
 viser = pytest.importorskip("viser")
@@ -82,7 +82,7 @@ def test_a_slider_moves_only_one_joint_and_the_results_are_checked(viewer: Viewe
 def shown(viewer: Viewer) -> list[float]:
     scale = np.pi / 180.0 if viewer.units.value == "degrees" else 1.0
     both = zip(viewer.sliders.rows, viewer.sliders.handles, strict=True)
-    return [handle.value * (scale if row.turns else 1.0) for row, handle in both]
+    return [handle.value * (scale if row.is_angle else 1.0) for row, handle in both]
 
 
 @pytest.mark.slow
@@ -112,7 +112,7 @@ def test_the_text_field_shows_and_reads_q_in_a_convention() -> None:
         numbers = [float(x) for x in viewer.words_of_q.value.split(",")]
         assert numbers == mujoco.to(q).tolist()
         assert viewer.words_of_q.label == "q of mujoco, to copy or type"
-        viewer.words_of_q.value = written(mujoco.to(other := robot.sample(1, 6)[0]))
+        viewer.words_of_q.value = format_values(mujoco.to(other := robot.sample(1, 6)[0]))
         viewer._read_q(SimpleNamespace(client=object()))
         np.testing.assert_array_equal(viewer.q, other)
 
@@ -173,7 +173,7 @@ def test_the_camera_shows_the_whole_robot_and_the_robot_fills_the_view(aspect: f
 
 
 def test_each_joint_has_sliders_for_velocity_and_acceleration(viewer: Viewer) -> None:
-    viewer.set_rates(np.zeros(6), np.zeros(6))
+    viewer.set_velocities(np.zeros(6), np.zeros(6))
     viewer.units.value = "radians"
     viewer.rates.handles[2].value = 0.5
     viewer.second_rates.handles[0].value = -1.0
@@ -182,7 +182,7 @@ def test_each_joint_has_sliders_for_velocity_and_acceleration(viewer: Viewer) ->
     assert viewer.a.tolist() == [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     expected = viewer.robot.acceleration(viewer.q, viewer.v, viewer.a, viewer.frame.value)
     np.testing.assert_array_equal(viewer.motion.acceleration[0], expected)
-    viewer.set_rates(np.zeros(6), np.zeros(6))
+    viewer.set_velocities(np.zeros(6), np.zeros(6))
 
 
 @pytest.mark.slow
@@ -212,7 +212,7 @@ def test_the_browser_is_started_with_a_file_that_no_other_user_can_read(
     asked: list[str] = []
     monkeypatch.setattr("webbrowser.open", asked.append)
     address = "http://127.0.0.1:8080/the-key/"
-    with opened_page(address):
+    with open_page(address):
         (url,) = asked
         assert "the-key" not in url
         page = Path(url.removeprefix("file://"))
@@ -223,7 +223,7 @@ def test_the_browser_is_started_with_a_file_that_no_other_user_can_read(
 
 @pytest.mark.slow
 def test_every_overlay_can_be_shown_in_every_reference_frame(viewer: Viewer) -> None:
-    viewer.set_rates(np.ones(6), np.full(6, 0.5))
+    viewer.set_velocities(np.ones(6), np.full(6, 0.5))
     viewer.parts.value = True
     for reference in ("local", "world", "local_world_aligned"):
         for what in ("linear", "angular", "none"):

@@ -25,21 +25,21 @@ from urdfkin.calibration.fit import (
     FALSE_ALARM,
     Fit,
     Identification,
-    Measured,
+    Measurements,
     Noise,
-    best_fit,
-    demand_metres,
-    first_names,
+    check_metres,
+    chi2_quantile,
+    estimate_start_values,
+    fit_parameters,
     identify,
-    outliers,
-    quantile,
-    significant,
-    stacked,
-    start_values,
+    join_names,
+    reject_outliers,
+    select_significant,
+    stack_jacobian,
 )
-from urdfkin.calibration.parameters import CalibrationModel, Parameter, table_model, urdf_model
+from urdfkin.calibration.parameters import CalibrationModel, Parameter, make_table_model, make_urdf_model
 from urdfkin.calibration.plausible import FitWithData, Plausibility, check_plausibility
-from urdfkin.calibration.write_back import Rewritten
+from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.comparison.result import length
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
@@ -55,23 +55,23 @@ from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: Number of random configurations for `Calibration.general`.
-_GENERAL = 40
+#: Number of random configurations for `Calibration.general_identification`.
+_GENERAL_CONFIGURATIONS = 40
 #: A warning is given if the residuals differ from the stated noise by more standard deviations than this.
-_UNLIKELY = 4.0
-#: Ratio of uncertainties (`Calibration.weak`) above which a parameter is poorly observable.
-_WEAK = 10.0
-_WEAK_SEED = 1
+_NOISE_RATIO_SIGMAS = 4.0
+#: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
+_POORLY_OBSERVABLE_RATIO = 10.0
+_RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
-_DEPENDENT = 1e-12
+_RANK_TOLERANCE = 1e-12
 #: The coordinates of a target are the robot's size divided by these numbers.
 #: Such a target lies on no joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: Factor of `ParametricChain.rounding` for the comparison with Pinocchio.
+#: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
 #: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
-_READ_BACK = 4.0
+_ROUNDING_FACTOR = 4.0
 #: Maximum number of parameters or poses that a warning names.
-_NAMED = 6
+_MAX_NAMES = 6
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -85,34 +85,34 @@ class Calibration:
         robot: The robot before the calibration.
         model: The model with the parameters to fit.
         identification: The parameters that are identifiable from the measured poses.
-        general: The parameters that are identifiable from random poses.
-        fitted: The fit; None without poses.
-        before: The fit of only base and tool, with the robot's original parameters.
-        odd: Indices of the outlier poses.
-        without_odd: The fit without the outliers.
-        weak: Indices of poorly observable parameters, each with a ratio of two uncertainties. The first is
-            the uncertainty at the measured configurations. It is divided by the uncertainty at the same
-            number of random configurations.
+        general_identification: The parameters that are identifiable from random poses.
+        full_fit: The fit; None without poses.
+        base_tool_fit: The fit of only base and tool, with the robot's original parameters.
+        outliers: Indices of the outlier poses.
+        fit_without_outliers: The fit without the outliers.
+        poorly_observable: Indices of poorly observable parameters, each with a ratio of two uncertainties.
+            The first is the uncertainty at the measured configurations. It is divided by the uncertainty at
+            the same number of random configurations.
         certificate: The result of checking the written model with Pinocchio.
-        stated: Whether the user stated the noise.
+        is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
-        significant: Indices of the parameters that `written_fit` fits.
+        selected_parameters: Indices of the parameters that `written_fit` fits.
         plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
 
     robot: Robot
     model: CalibrationModel
     identification: Identification
-    general: Identification
-    fitted: Fit | None = None
-    before: Fit | None = None
-    odd: tuple[int, ...] = ()
-    without_odd: Fit | None = None
-    weak: dict[int, float] | None = None
+    general_identification: Identification
+    full_fit: Fit | None = None
+    base_tool_fit: Fit | None = None
+    outliers: tuple[int, ...] = ()
+    fit_without_outliers: Fit | None = None
+    poorly_observable: dict[int, float] | None = None
     certificate: Certificate | None = None
-    stated: bool = False
+    is_noise_stated: bool = False
     written_fit: Fit | None = None
-    significant: tuple[int, ...] = ()
+    selected_parameters: tuple[int, ...] = ()
     plausibility: Plausibility = field(default_factory=Plausibility)
 
     @property
@@ -120,61 +120,73 @@ class Calibration:
         return self.model.chain.parameters
 
     @cached_property
-    def values(self) -> FloatArray:
+    def changes(self) -> FloatArray:
         """(p,) change of each parameter, m and rad; 0 for fixed parameters."""
-        return self._change(self.fitted)
+        return self._change(self.full_fit)
 
     def _change(self, fit: Fit | None) -> FloatArray:
-        return np.zeros(len(self.parameters)) if fit is None else fit.at - self.model.chain.start
+        return (
+            np.zeros(len(self.parameters))
+            if fit is None
+            else fit.parameter_values - self.model.chain.initial_values
+        )
 
     @cached_property
     def writable(self) -> frozenset[int]:
         """Indices of the parameters that the file can store; a URDF cannot store base, tool and gains."""
         is_table = isinstance(self.model.source, DHTable)
         pairs = enumerate(self.parameters)
-        return frozenset(k for k, p in pairs if p.what != "gain" and (is_table or not p.end))
+        return frozenset(k for k, p in pairs if p.name != "gain" and (is_table or not p.is_base_or_tool))
 
     @property
     def written_parameters(self) -> tuple[int, ...]:
-        return tuple(k for k in self.significant if k in self.writable)
+        return tuple(k for k in self.selected_parameters if k in self.writable)
 
     @cached_property
-    def written_values(self) -> FloatArray:
+    def written_changes(self) -> FloatArray:
         """(p,) change of each parameter in the written fit, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property
-    def deviations(self) -> FloatArray:
+    def standard_deviations(self) -> FloatArray:
         """(p,) standard deviations, m and rad; 0 for fixed parameters."""
         deviations = np.zeros(len(self.parameters))
-        if self.fitted is not None:
-            deviations[list(self.identification.kept)] = np.sqrt(np.diag(self.fitted.covariance))
+        if self.full_fit is not None:
+            deviations[list(self.identification.free_parameters)] = np.sqrt(np.diag(self.full_fit.covariance))
         return deviations
 
     @property
     def origins(self) -> dict[str, FloatArray]:
         """The new origin (4, 4) of each joint whose origin moved, by joint name."""
-        return {} if self.written_fit is None else self.model.origins(self.written_fit.at)
+        return {} if self.written_fit is None else self.model.origins(self.written_fit.parameter_values)
 
     @property
     def base(self) -> FloatArray | None:
         """(4, 4) pose of the robot's base in the instrument's frame; None if it was not fitted."""
-        return None if self.written_fit is None else self.model.end("base", self.written_fit.at)
+        return (
+            None
+            if self.written_fit is None
+            else self.model.base_or_tool_pose("base", self.written_fit.parameter_values)
+        )
 
     @property
     def tool(self) -> FloatArray | None:
         """(4, 4) pose of the target in the tip's frame; None if it was not fitted."""
-        return None if self.written_fit is None else self.model.end("tool", self.written_fit.at)
+        return (
+            None
+            if self.written_fit is None
+            else self.model.base_or_tool_pose("tool", self.written_fit.parameter_values)
+        )
 
     @property
     def table(self) -> DHTable | None:
         """The calibrated table; None for a URDF."""
-        return None if self.written_fit is None else self.model.table(self.written_fit.at)
+        return None if self.written_fit is None else self.model.table(self.written_fit.parameter_values)
 
     @cached_property
-    def written(self) -> Rewritten:
+    def updated_urdf(self) -> UpdatedURDF:
         """The original text of the URDF with the new origins, and the effect of the changes."""
-        return Rewritten(self.robot, self.origins)
+        return UpdatedURDF(self.robot, self.origins)
 
 
 class ImplausibleError(InputError):
@@ -201,11 +213,11 @@ def calibrate(
     base: str | None = None,
     fit: Collection[str] = ("origins",),
     noise: tuple[float, float] | None = None,
-    drop_odd: bool = False,
-    complete: bool = True,
+    drop_outliers: bool = False,
+    full_poses: bool = True,
     radians: bool = False,
     force: bool = False,
-    every: bool = False,
+    write_all: bool = False,
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
@@ -225,13 +237,13 @@ def calibrate(
             of the joint values.
         noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
-        drop_odd: Whether to exclude outlier poses from the fit; outliers are always reported.
-        complete: Whether you will measure full poses, and not only positions. This argument is used only if
+        drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
+        full_poses: Whether you will measure full poses, and not only positions. This argument is used only if
             `poses` is None.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
             Joint values that look like degrees are refused in any case, unless `radians` is True.
-        every: Whether to write all fitted parameters, including parameters that changed by less than two
+        write_all: Whether to write all fitted parameters, including parameters that changed by less than two
             standard deviations.
 
     Raises:
@@ -243,11 +255,11 @@ def calibrate(
 
     Example:
         >>> import urdfkin
-        >>> found = urdfkin.calibrate("ur5", fit=["base", "tool", "origins"], tip="tool0")
-        >>> found.identification.rank, len(found.parameters)
+        >>> calibration = urdfkin.calibrate("ur5", fit=["base", "tool", "origins"], tip="tool0")
+        >>> calibration.identification.rank, len(calibration.parameters)
         (30, 54)
     """
-    found = fitted_model(
+    calibration = fit_model(
         source,
         q,
         poses,
@@ -255,20 +267,20 @@ def calibrate(
         base=base,
         fit=fit,
         noise=noise,
-        drop_odd=drop_odd,
-        complete=complete,
+        drop_outliers=drop_outliers,
+        full_poses=full_poses,
         radians=as_bool(radians, "radians"),
-        every=as_bool(every, "every"),
+        write_all=as_bool(write_all, "write_all"),
     )
     force = as_bool(force, "force")
-    if found.plausibility.is_in_degrees:
-        raise ImplausibleError(found, "if these values are radians, pass radians=True")
-    if found.plausibility.objections and not force:
-        raise ImplausibleError(found, "to return this fit anyway, pass force=True")
-    return found
+    if calibration.plausibility.is_in_degrees:
+        raise ImplausibleError(calibration, "if these values are radians, pass radians=True")
+    if calibration.plausibility.objections and not force:
+        raise ImplausibleError(calibration, "to return this fit anyway, pass force=True")
+    return calibration
 
 
-def fitted_model(
+def fit_model(
     source: Robot | Source | DHTable,
     q: ArrayLike | None,
     poses: ArrayLike | None,
@@ -277,40 +289,47 @@ def fitted_model(
     base: str | None,
     fit: Collection[str] = ("origins",),
     noise: tuple[float, float] | None = None,
-    drop_odd: bool = False,
-    complete: bool = True,
+    drop_outliers: bool = False,
+    full_poses: bool = True,
     radians: bool = False,
-    every: bool = True,
+    write_all: bool = True,
     check: bool = True,
 ) -> Calibration:
     """Fit as `calibrate` does, but also return implausible fits."""
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
-        table_model(source, names)
+        make_table_model(source, names)
         if isinstance(source, DHTable)
-        else urdf_model(
+        else make_urdf_model(
             robot.tree,
             as_choice(tip, robot.tip_frame, "tip"),
             as_choice(base, robot.base_frame, "base"),
             names,
         )
     )
-    drop_odd, complete = as_bool(drop_odd, "drop_odd"), as_bool(complete, "complete")
+    drop_outliers, full_poses = as_bool(drop_outliers, "drop_outliers"), as_bool(full_poses, "full_poses")
     if (q is None) != (poses is None):
         raise InputError("`q` and `poses` must be given together", found="only one of the two")
-    general = _values(model, robot, robot.sample(_GENERAL))
+    general = _joint_values(model, robot, robot.sample(_GENERAL_CONFIGURATIONS))
     if q is None or poses is None:
-        identifiable = identify(model, general, complete=complete, at=_general_target(model))
+        identifiable = identify(
+            model, general, full_poses=full_poses, parameter_values=_general_target(model)
+        )
         return Calibration(robot, model, identifiable, identifiable)
-    path_q, measured = _check_measured(robot, model, q, poses)
-    data, found = _fit(robot, model, path_q, measured, noise, drop_odd, every=every)
-    identifiable = identify(model, general, complete=measured.complete, at=data.fitted.at)
-    found = replace(found, general=identifiable)
+    path_q, measurements = _check_measured(robot, model, q, poses)
+    data, calibration = _fit(robot, model, path_q, measurements, noise, drop_outliers, write_all=write_all)
+    identifiable = identify(
+        model, general, full_poses=measurements.full_poses, parameter_values=data.full_fit.parameter_values
+    )
+    calibration = replace(calibration, general_identification=identifiable)
     if check:
-        found = replace(found, plausibility=check_plausibility(data, radians=radians))
+        calibration = replace(calibration, plausibility=check_plausibility(data, radians=radians))
     return replace(
-        found, certificate=_verify_written(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64)))
+        calibration,
+        certificate=_verify_written(
+            calibration, measurements, np.atleast_2d(np.asarray(q, dtype=np.float64))
+        ),
     )
 
 
@@ -319,22 +338,22 @@ def _general_target(model: CalibrationModel) -> FloatArray:
 
     If the tool is fitted, its target is moved to a position that lies on no joint axis.
     """
-    at = model.chain.start.copy()
+    parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
-        if parameter.end and parameter.where == "tool" and parameter.unit == "m":
-            at[k] = model.chain.size / _TARGET_DIVISORS[parameter.what]
-    return at
+        if parameter.is_base_or_tool and parameter.element == "tool" and parameter.unit == "m":
+            parameter_values[k] = model.chain.characteristic_length / _TARGET_DIVISORS[parameter.name]
+    return parameter_values
 
 
-def _values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
+def _joint_values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
 def _check_measured(
     robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
-) -> tuple[FloatArray, Measured]:
+) -> tuple[FloatArray, Measurements]:
     """Check the arguments; return the path's coordinates (samples, n) and the measured poses."""
-    T = checked_poses(poses)
+    T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.parse(q, "q")
     else:
@@ -349,72 +368,80 @@ def _check_measured(
         )
     if not len(T):
         raise InputError("no poses", remedy="give poses; a fit needs more measured numbers than parameters")
-    measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
-    demand_metres(model, measured)
-    return path_q, measured
+    measurements = Measurements(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measurements(values, T)
+    check_metres(model, measurements)
+    return path_q, measurements
 
 
 def _fit(
     robot: Robot,
     model: CalibrationModel,
     q: FloatArray,
-    measured: Measured,
+    measurements: Measurements,
     noise: tuple[float, float] | None,
-    drop_odd: bool,
+    drop_outliers: bool,
     *,
-    every: bool,
+    write_all: bool,
 ) -> tuple[FitWithData, Calibration]:
-    stated, start = None if noise is None else _parse_noise(noise), start_values(model, measured)
-    identification = identify(model, measured.values, complete=measured.complete, at=start)
-    ends = [k for k in identification.kept if model.chain.parameters[k].end]
-    before = best_fit(model, measured, ends, stated, start)
-    found = best_fit(model, measured, identification.kept, stated, before.at)
-    identification, found = _add_identifiable(model, measured, identification, stated, found)
-    odd, clean = outliers(model, measured, identification.kept, stated, found)
-    if drop_odd and odd:
-        chosen = np.ones(len(measured), dtype=bool)
+    stated, start = None if noise is None else _parse_noise(noise), estimate_start_values(model, measurements)
+    identification = identify(
+        model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=start
+    )
+    ends = [k for k in identification.free_parameters if model.chain.parameters[k].is_base_or_tool]
+    before = fit_parameters(model, measurements, ends, stated, start)
+    full_fit = fit_parameters(
+        model, measurements, identification.free_parameters, stated, before.parameter_values
+    )
+    identification, full_fit = _add_identifiable(model, measurements, identification, stated, full_fit)
+    odd, clean = reject_outliers(model, measurements, identification.free_parameters, stated, full_fit)
+    if drop_outliers and odd:
+        chosen = np.ones(len(measurements), dtype=bool)
         chosen[list(odd)] = False
-        q, measured, found = q[chosen], measured.some(chosen), clean
-        before = best_fit(model, measured, ends, stated, before.at)
-    fit = FitWithData(model, q, measured, identification, before, found)
-    chosen_parameters, written = identification.kept, found
-    if not every:
-        chosen_parameters, written = _significant(fit, stated)
+        q, measurements, full_fit = q[chosen], measurements.select(chosen), clean
+        before = fit_parameters(model, measurements, ends, stated, before.parameter_values)
+    fit = FitWithData(model, q, measurements, identification, before, full_fit)
+    chosen_parameters, written = identification.free_parameters, full_fit
+    if not write_all:
+        chosen_parameters, written = _refit_significant(fit, stated)
     return fit, Calibration(
         robot,
         model,
         identification,
         identification,
-        found,
+        full_fit,
         before,
         odd,
         clean if odd else None,
-        _weak(robot, model, measured, identification.kept, found.at),
-        stated=noise is not None,
+        _find_poorly_observable(
+            robot, model, measurements, identification.free_parameters, full_fit.parameter_values
+        ),
+        is_noise_stated=noise is not None,
         written_fit=written,
-        significant=chosen_parameters,
+        selected_parameters=chosen_parameters,
     )
 
 
-def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    model, kept, found = fit.model, fit.identification.kept, fit.fitted
-    is_end = [model.chain.parameters[k].end for k in kept]
-    change = found.at[list(kept)] - model.chain.start[list(kept)]
-    chosen = tuple(np.array(kept, dtype=int)[significant(change, found.covariance, is_end)].tolist())
+def _refit_significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
+    model, kept, full_fit = fit.model, fit.identification.free_parameters, fit.full_fit
+    is_end = [model.chain.parameters[k].is_base_or_tool for k in kept]
+    change = full_fit.parameter_values[list(kept)] - model.chain.initial_values[list(kept)]
+    chosen = tuple(
+        np.array(kept, dtype=int)[select_significant(change, full_fit.covariance, is_end)].tolist()
+    )
     if chosen == kept:
-        return kept, found
-    at = found.at.copy()
+        return kept, full_fit
+    parameter_values = full_fit.parameter_values.copy()
     out = [k for k in kept if k not in chosen]
-    at[out] = model.chain.start[out]
-    return chosen, best_fit(model, fit.measured, chosen, stated, at)
+    parameter_values[out] = model.chain.initial_values[out]
+    return chosen, fit_parameters(model, fit.measurements, chosen, stated, parameter_values)
 
 
 def _add_identifiable(
     model: CalibrationModel,
-    measured: Measured,
+    measurements: Measurements,
     identification: Identification,
     stated: Noise | None,
-    found: Fit,
+    full_fit: Fit,
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
@@ -422,14 +449,21 @@ def _add_identifiable(
     For example, if the tip lies on the last joint's axis, the tip's position does not depend on the last
     joint's angle.
     """
-    again = identify(model, measured.values, complete=measured.complete, at=found.at)
+    again = identify(
+        model,
+        measurements.joint_values,
+        full_poses=measurements.full_poses,
+        parameter_values=full_fit.parameter_values,
+    )
     more = again.rank - identification.rank
     if more <= 0:
-        return identification, found
-    trial = best_fit(model, measured, again.kept, stated, found.at)
-    scale = trial.noise.of(measured.complete)
-    explained = float(((found.errors / scale) ** 2).sum() - ((trial.errors / scale) ** 2).sum())
-    return (again, trial) if explained > quantile(1.0 - FALSE_ALARM, more) else (identification, found)
+        return identification, full_fit
+    trial = fit_parameters(model, measurements, again.free_parameters, stated, full_fit.parameter_values)
+    scale = trial.noise.deviations(measurements.full_poses)
+    explained = float(((full_fit.residuals / scale) ** 2).sum() - ((trial.residuals / scale) ** 2).sum())
+    return (
+        (again, trial) if explained > chi2_quantile(1.0 - FALSE_ALARM, more) else (identification, full_fit)
+    )
 
 
 def _parse_noise(noise: tuple[float, float]) -> Noise:
@@ -445,107 +479,121 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
     return Noise(metres, radians)
 
 
-def _weak(
-    robot: Robot, model: CalibrationModel, measured: Measured, kept: Sequence[int], at: FloatArray
+def _find_poorly_observable(
+    robot: Robot,
+    model: CalibrationModel,
+    measurements: Measurements,
+    kept: Sequence[int],
+    parameter_values: FloatArray,
 ) -> dict[int, float]:
-    general = _values(model, robot, robot.sample(len(measured), seed=_WEAK_SEED))
+    general = _joint_values(model, robot, robot.sample(len(measurements), seed=_RANDOM_SEED))
     uncertainties = []
-    for values in (measured.values, general):
-        J = stacked(model, values, complete=measured.complete, at=at)[:, list(kept)]
+    for values in (measurements.joint_values, general):
+        J = stack_jacobian(
+            model, values, full_poses=measurements.full_poses, parameter_values=parameter_values
+        )[:, list(kept)]
         _, R = np.linalg.qr(J)
-        if (np.abs(np.diag(R)) <= _DEPENDENT * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
+        if (np.abs(np.diag(R)) <= _RANK_TOLERANCE * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
             return {}
         uncertainties.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
     ratios = uncertainties[0] / uncertainties[1]
-    return {k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _WEAK}
+    return {
+        k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _POORLY_OBSERVABLE_RATIO
+    }
 
 
-def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
+def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio.
 
     A URDF is compared at the measured configurations, and a table at q = 0. A URDF cannot contain base, tool
     or gains, so these parameters are 0 in the comparison of a URDF.
     """
-    model, fitted = found.model, found.written_fit
+    model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
         return None
-    at = fitted.at.copy()
-    at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
+    parameter_values = fitted.parameter_values.copy()
+    parameter_values[[p.is_base_or_tool or p.name == "gain" for p in calibration.parameters]] = 0.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The first `load` gave these warnings.
-        if (table := found.table) is not None:
+        if (table := calibration.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)
             return robot.certificate()
-        T = found.written.loaded.placement(q, [model.base, model.tip])
+        T = calibration.updated_urdf.new_robot.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
-    error = np.abs(theirs - model.chain.poses(measured.values, at))
-    bound = _READ_BACK * model.chain.rounding(measured.values)
-    if error[:, :3, 3].max() > bound or error[:, :3, :3].max() > bound / model.chain.size:
+    error = np.abs(theirs - model.chain.poses(measurements.joint_values, parameter_values))
+    bound = _ROUNDING_FACTOR * model.chain.rounding_bound(measurements.joint_values)
+    if error[:, :3, 3].max() > bound or error[:, :3, :3].max() > bound / model.chain.characteristic_length:
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
-            where=f"{found.robot.name}, {model.base} to {model.tip}",
+            where=f"{calibration.robot.name}, {model.base} to {model.tip}",
             found=f"a difference of {error.max():.3g} m or rad, but rounding explains only {bound:.3g}",
             remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
-    return found.written.loaded.certificate()
+    return calibration.updated_urdf.new_robot.certificate()
 
 
-def doubts(found: Calibration) -> list[str]:
-    return list(_warnings(found))
+def list_warnings(calibration: Calibration) -> list[str]:
+    return list(_warnings(calibration))
 
 
-def _warnings(found: Calibration) -> Iterator[str]:
-    fitted, name = found.fitted, [str(parameter) for parameter in found.parameters]
+def _warnings(calibration: Calibration) -> Iterator[str]:
+    fitted, name = calibration.full_fit, [str(parameter) for parameter in calibration.parameters]
     if fitted is None:
         return
-    lost = found.general.rank - found.identification.rank
+    general, identification = calibration.general_identification, calibration.identification
+    lost = general.rank - identification.rank
     if lost > 0:
-        others = [k for k in found.general.kept if k not in found.identification.kept]
+        others = [k for k in general.free_parameters if k not in identification.free_parameters]
         yield (
-            f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
-            f"would identify {lost} more: {first_names((name[k] for k in others), _NAMED)}"
+            f"{identification.rank} parameters are identifiable from these poses; more varied poses "
+            f"would identify {lost} more: {join_names((name[k] for k in others), _MAX_NAMES)}"
         )
-    if found.weak:
-        worst = sorted(found.weak.items(), key=lambda one: -one[1])
+    if calibration.poorly_observable:
+        worst = sorted(calibration.poorly_observable.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
-            + first_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _NAMED)
+            + join_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _MAX_NAMES)
             + "; the usual uncertainty is the uncertainty at the same number of random configurations"
         )
-    if not fitted.is_judged:
+    if not fitted.has_redundancy:
         yield "the fit cannot be checked, because there are as many parameters as measured numbers"
-    elif fitted.freedom < len(found.identification.kept):
+    elif fitted.total_redundancy < len(calibration.identification.free_parameters):
         yield (
-            f"there are only {fitted.freedom:.0f} redundant measured numbers for "
-            f"{len(found.identification.kept)} parameters"
+            f"there are only {fitted.total_redundancy:.0f} redundant measured numbers for "
+            f"{len(calibration.identification.free_parameters)} parameters"
         )
-    if found.stated and abs(fitted.ratio - 1.0) > _UNLIKELY * fitted.spread:
+    if (
+        calibration.is_noise_stated
+        and abs(fitted.noise_ratio - 1.0) > _NOISE_RATIO_SIGMAS * fitted.noise_ratio_deviation
+    ):
         yield (
-            f"the residuals are {fitted.ratio:.3g} times the stated noise: "
+            f"the residuals are {fitted.noise_ratio:.3g} times the stated noise: "
             "the true noise differs, or the model is too simple"
         )
-    if found.odd and found.without_odd is not None:
-        one = len(found.odd) == 1
-        poses = f"pose{'' if one else 's'} {first_names(map(str, found.odd), _NAMED)} "
-        if len(fitted.errors) == len(found.without_odd.errors):
+    if calibration.outliers and calibration.fit_without_outliers is not None:
+        one = len(calibration.outliers) == 1
+        poses = f"pose{'' if one else 's'} {join_names(map(str, calibration.outliers), _MAX_NAMES)} "
+        if len(fitted.residuals) == len(calibration.fit_without_outliers.residuals):
             yield poses + f"{'is' if one else 'are'} excluded as {'an outlier' if one else 'outliers'}"
         else:
-            ours, theirs = (length(each.rms()[0]) for each in (fitted, found.without_odd))
+            ours, theirs = (length(each.rms()[0]) for each in (fitted, calibration.fit_without_outliers))
             yield (
                 poses + f"{'is an outlier' if one else 'are outliers'}: the rms error is {theirs} without "
                 f"{'it' if one else 'them'}, {ours} with {'it' if one else 'them'}"
             )
-    gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
+    gains = [
+        k for k in calibration.identification.free_parameters if calibration.parameters[k].name == "gain"
+    ]
     if gains:
         yield (
             "these gains are not written, because a URDF cannot store them: "
-            + first_names((name[k] for k in gains), _NAMED)
+            + join_names((name[k] for k in gains), _MAX_NAMES)
         )
 
 
 #: Largest accepted error of a rotation matrix or of a quaternion's length; numbers in files are rounded.
-_WRITTEN = 1e-3
+_ROTATION_TOLERANCE = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW = tuple(f"T3{j}" for j in range(4))
@@ -555,21 +603,21 @@ UNITS = {"m": 1.0, "mm": 1e-3}
 def read_poses(
     path: Path,
     coordinates: Sequence[str],
-    needed: Sequence[str],
+    required_coordinates: Sequence[str],
     unit: str = "m",
     units: Mapping[str, str] | None = None,
-    rest: FloatArray | None = None,
+    default_q: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
-    `needed` names the coordinates that a CSV file must contain. `rest` (nq,) contains the values of
-    coordinates without a column.
+    `required_coordinates` names the coordinates that a CSV file must contain. `default_q` (nq,)
+    contains the values of coordinates without a column.
     """
     if path.suffix.lower() == ".npz":
         q, T = _archive(path, len(coordinates))
     else:
-        rest = np.zeros(len(coordinates)) if rest is None else rest
-        q, T = _table(path, coordinates, needed, units or {}, rest)
+        default_q = np.zeros(len(coordinates)) if default_q is None else default_q
+        q, T = _table(path, coordinates, required_coordinates, units or {}, default_q)
     T = T.copy()
     positions = T if T.ndim == 2 else T[:, :3, 3]
     positions *= UNITS[unit]
@@ -579,20 +627,20 @@ def read_poses(
 def _table(
     path: Path,
     coordinates: Sequence[str],
-    needed: Sequence[str],
+    required_coordinates: Sequence[str],
     units: Mapping[str, str],
-    rest: FloatArray,
+    default_q: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     text, where = read_text(path, MOST_DATA, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX if "T00" in names else _POSITION
-    others = [name for name in coordinates if name not in needed]
+    others = [name for name in coordinates if name not in required_coordinates]
     optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
-    required = [*needed, *kind]
+    required = [*required_coordinates, *kind]
     data = read_columns(text, where, "measured poses", required, optional, named=True, units=units)
     s = len(data[kind[0]])
-    values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, rest, strict=True)]
+    values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, default_q, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))
     part = [name for name in _QUATERNION if name in data]
     if 0 < len(part) < len(_QUATERNION):
@@ -630,7 +678,7 @@ def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
 def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray:
     lengths = np.linalg.norm(quat, axis=-1, keepdims=True)
     errors = np.abs(lengths - 1.0)
-    if errors.max(initial=0.0) > _WRITTEN:
+    if errors.max(initial=0.0) > _ROTATION_TOLERANCE:
         worst = int(errors.argmax())
         raise InputError(
             "an orientation must be a quaternion of length 1, scalar last",
@@ -645,7 +693,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     """Replace each measured rotation by the nearest rotation matrix, because the input may be rounded."""
     R = T[:, :3, :3]
-    wrong = rotation_defect(R) > _WRITTEN
+    wrong = rotation_defect(R) > _ROTATION_TOLERANCE
     if wrong.any():
         raise InputError(
             "a pose must be a rotation and a translation",
@@ -657,7 +705,7 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     return exact
 
 
-def checked_poses(poses: ArrayLike) -> FloatArray:
+def as_pose_array(poses: ArrayLike) -> FloatArray:
     """Return poses (s, 4, 4) or positions (s, 3) as an array."""
     array = as_finite(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:

@@ -72,12 +72,12 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
 #: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
-_AS_GOOD = 0.5
+_PIVOT_FRACTION = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
-_NAMED = 3
+_MAX_NAMES = 3
 #: A parameter stays fixed if fitted parameters together have the same effect; a message lists them.
 #: The message omits a fitted parameter that contributes at most this fraction of the effect.
-_SHARE = 1e-6
+_EFFECT_FRACTION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -85,48 +85,65 @@ class Identification:
     """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters, which have linearly independent effects.
-        still: Indices of the fixed parameters, each with the reason.
-        numbers: Number of all measured coordinates; a position has 3 coordinates, and a full pose has 6.
+        free_parameters: Indices of the fitted parameters, which have linearly independent effects.
+        fixed_parameters: Indices of the fixed parameters, each with the reason.
+        measured_numbers: Number of all measured coordinates; a position has 3 coordinates, and a full pose
+            has 6.
     """
 
-    kept: tuple[int, ...]
-    still: dict[int, str]
-    numbers: int
+    free_parameters: tuple[int, ...]
+    fixed_parameters: dict[int, str]
+    measured_numbers: int
 
     @property
     def rank(self) -> int:
-        return len(self.kept)
+        return len(self.free_parameters)
 
 
-def stacked(
-    model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
+def stack_jacobian(
+    model: CalibrationModel,
+    joint_values: FloatArray,
+    *,
+    full_poses: bool,
+    parameter_values: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the dimensionless Jacobian (rows, p) of all measurements, with angles times `chain.size`."""
-    L = model.chain.size
-    _, columns = model.chain.columns(values, at)
+    """Return the dimensionless Jacobian (rows, p) of all measurements.
+
+    Angles are multiplied by `chain.characteristic_length`.
+    """
+    L = model.chain.characteristic_length
+    _, columns = model.chain.poses_and_jacobian(joint_values, parameter_values)
     columns[:, 3:] *= L
     lengths = np.array([1.0 if parameter.unit == "m" else 1.0 / L for parameter in model.chain.parameters])
-    J = columns[:, : 6 if complete else 3] * lengths
+    J = columns[:, : 6 if full_poses else 3] * lengths
     return J.reshape(-1, len(lengths)) if len(lengths) else np.empty((J.size, 0))
 
 
 def identify(
-    model: CalibrationModel, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
+    model: CalibrationModel,
+    joint_values: FloatArray,
+    *,
+    full_poses: bool = True,
+    parameter_values: FloatArray | None = None,
 ) -> Identification:
-    """Determine which parameters are identifiable at the joint values (s, n) and the parameters `at` (p,).
+    """Determine which parameters are identifiable at joint values (s, n) and parameter values (p,).
 
-    `complete` is True if full poses are measured, and False if only positions are measured.
+    `full_poses` is True if full poses are measured, and False if only positions are measured.
     """
-    J = stacked(model, values, complete=complete, at=at)
-    error = np.full_like(J, model.chain.rounding(values))
-    kept = list[int]()
+    J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
+    error = np.full_like(J, model.chain.rounding_bound(joint_values))
+    free_parameters = list[int]()
     for group in model.groups:
-        columns = [*kept, *group]
-        count = _rank(J[:, columns], error[:, columns]) - len(kept)
-        kept += _most_independent(J, kept, group, count)
-    still = {k: _reason(model, J, error, kept, k) for group in model.groups for k in group if k not in kept}
-    return Identification(tuple(kept), still, len(J))
+        columns = [*free_parameters, *group]
+        count = _rank(J[:, columns], error[:, columns]) - len(free_parameters)
+        free_parameters += _most_independent(J, free_parameters, group, count)
+    fixed = {
+        k: _reason(model, J, error, free_parameters, k)
+        for group in model.groups
+        for k in group
+        if k not in free_parameters
+    }
+    return Identification(tuple(free_parameters), fixed, len(J))
 
 
 def _rank(J: FloatArray, error: FloatArray) -> int:
@@ -136,12 +153,15 @@ def _rank(J: FloatArray, error: FloatArray) -> int:
     return int(np.count_nonzero(lower > 0.0))
 
 
-def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], count: int) -> list[int]:
-    Q, remainders, chosen = np.linalg.qr(J[:, list(kept)])[0], J[:, list(group)].copy(), list[int]()
+def _most_independent(
+    J: FloatArray, free_parameters: Sequence[int], group: Sequence[int], count: int
+) -> list[int]:
+    Q, chosen = np.linalg.qr(J[:, list(free_parameters)])[0], list[int]()
+    remainders = J[:, list(group)].copy()
     remainders -= Q @ (Q.T @ remainders)
     for _ in range(max(count, 0)):
         lengths = np.linalg.norm(remainders, axis=0)
-        i = int(np.argmax(lengths >= _AS_GOOD * lengths.max()))
+        i = int(np.argmax(lengths >= _PIVOT_FRACTION * lengths.max()))
         chosen.append(group[i])
         direction = remainders[:, i] / lengths[i]
         remainders -= np.outer(direction, direction @ remainders)
@@ -149,62 +169,64 @@ def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], 
     return sorted(chosen, key=list(group).index)
 
 
-def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
-    column, others = J[:, k], J[:, list(kept)]
+def _reason(
+    model: CalibrationModel, J: FloatArray, error: FloatArray, free_parameters: Sequence[int], k: int
+) -> str:
+    column, others = J[:, k], J[:, list(free_parameters)]
     if np.linalg.norm(column) <= np.linalg.norm(error[:, k]):
         return "no effect on the measured numbers"
     shares = np.linalg.lstsq(others, column, rcond=None)[0] * np.linalg.norm(others, axis=0)
     shares = np.abs(shares) / np.linalg.norm(column)
-    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
-    names = first_names((str(model.chain.parameters[kept[i]]) for i in order), _NAMED)
+    order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _EFFECT_FRACTION]
+    names = join_names((str(model.chain.parameters[free_parameters[i]]) for i in order), _MAX_NAMES)
     return f"same effect as {names}{' together' if len(order) > 1 else ''}"
 
 
-def first_names(names: Iterable[str], most: int) -> str:
+def join_names(names: Iterable[str], limit: int) -> str:
     every = list(names)
-    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
+    return ", ".join(every[:limit]) + (f" and {len(every) - limit} more" if len(every) > limit else "")
 
 
 #: A fit can be checked if its total redundancy is at least this number.
 #: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
-_ONE_OR_MORE = 0.5
+_MIN_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
 #: The fit absorbs pose errors along the eigenvectors of these eigenvalues, so no residual shows such errors.
-_UNOBSERVED = 1e-9
+_EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
-_ESTIMATES = 20
+_MAX_NOISE_ESTIMATES = 20
 #: The estimation ends when the relative change of the estimated noise is at most this number.
-_CONSTANT = 1e-3
+_NOISE_CONVERGENCE = 1e-3
 #: Probability that an outlier is reported for a data set without outliers.
 FALSE_ALARM = 0.01
 #: Number of standard deviations above which the change of a parameter is significant.
 SIGMAS = 2.0
-_MOST_OUTLIERS = 0.25
+_MAX_OUTLIER_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """Measured poses or positions.
 
     Attributes:
-        values: (s, n) joint values of the path, rad or m.
+        joint_values: (s, n) joint values of the path, rad or m.
         p: (s, 3) positions in the base, m.
         R: (s, 3, 3) orientations in the base; None if only positions were measured.
     """
 
-    values: FloatArray
+    joint_values: FloatArray
     p: FloatArray
     R: FloatArray | None = None
 
     @property
-    def complete(self) -> bool:
+    def full_poses(self) -> bool:
         return self.R is not None
 
     def __len__(self) -> int:
         return len(self.p)
 
-    def some(self, which: NDArray[np.bool_]) -> Measured:
-        return Measured(self.values[which], self.p[which], None if self.R is None else self.R[which])
+    def select(self, mask: NDArray[np.bool_]) -> Measurements:
+        return Measurements(self.joint_values[mask], self.p[mask], None if self.R is None else self.R[mask])
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,9 +236,9 @@ class Noise:
     metres: float
     radians: float
 
-    def of(self, complete: bool) -> FloatArray:
+    def deviations(self, full_poses: bool) -> FloatArray:
         """Return the standard deviations (6,) of a full pose, or (3,) of a position."""
-        return np.array([self.metres] * 3 + ([self.radians] * 3 if complete else []))
+        return np.array([self.metres] * 3 + ([self.radians] * 3 if full_poses else []))
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,8 +246,8 @@ class Fit:
     """The result of a fit.
 
     Attributes:
-        at: (p,) values of all parameters.
-        errors: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
+        parameter_values: (p,) values of all parameters.
+        residuals: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
         noise: The standard deviations by which the residuals are divided.
         covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. The covariance
             is infinite if the redundancy is 0.
@@ -233,167 +255,191 @@ class Fit:
         chi_squares: (s,) chi^2 statistic of each pose.
     """
 
-    at: FloatArray
-    errors: FloatArray
+    parameter_values: FloatArray
+    residuals: FloatArray
     noise: Noise
     covariance: FloatArray
     redundancies: FloatArray
     chi_squares: FloatArray
 
     @property
-    def freedom(self) -> float:
+    def total_redundancy(self) -> float:
         """The total redundancy: the number of measured coordinates minus the number of fitted parameters."""
         return float(self.redundancies.sum())
 
     @property
-    def is_judged(self) -> bool:
-        return self.freedom >= _ONE_OR_MORE
+    def has_redundancy(self) -> bool:
+        return self.total_redundancy >= _MIN_REDUNDANCY
 
     @property
-    def ratio(self) -> float:
+    def noise_ratio(self) -> float:
         """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct."""
-        if not self.is_judged:
+        if not self.has_redundancy:
             return math.nan
-        whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
-        return math.sqrt(float((whitened**2).sum()) / self.freedom)
+        whitened = self.residuals / self.noise.deviations(self.residuals.shape[1] == 6)
+        return math.sqrt(float((whitened**2).sum()) / self.total_redundancy)
 
     @property
-    def spread(self) -> float:
-        """The standard deviation of `ratio` if the stated noise is correct."""
-        return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
+    def noise_ratio_deviation(self) -> float:
+        """The standard deviation of `noise_ratio` if the stated noise is correct."""
+        return 1.0 / math.sqrt(2.0 * max(self.total_redundancy, _MIN_REDUNDANCY))
 
     def rms(self) -> tuple[float, float | None]:
         """Return the root mean square of the position errors (m) and of the orientation errors (rad)."""
-        position, rotation = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
-        return float(position), float(rotation) if self.errors.shape[1] == 6 else None
+        position, rotation = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.residuals, [3]))
+        return float(position), float(rotation) if self.residuals.shape[1] == 6 else None
 
     @property
-    def rms_words(self) -> str:
+    def rms_text(self) -> str:
         metres, radians = self.rms()
         return length(metres) if radians is None else f"{length(metres)}, {angle(radians)}"
 
 
-def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> FloatArray:
+def compute_residuals(
+    model: CalibrationModel, measurements: Measurements, parameter_values: FloatArray
+) -> FloatArray:
     """Return the residuals (s, 3) of positions or (s, 6) of poses, in m and rad, along the base's axes."""
-    return _residuals(measured, model.chain.poses(measured.values, at))
+    return _residuals_of_poses(measurements, model.chain.poses(measurements.joint_values, parameter_values))
 
 
-def _residuals(measured: Measured, T: FloatArray) -> FloatArray:
-    p = measured.p - T[:, :3, 3]
-    if measured.R is None:
+def _residuals_of_poses(measurements: Measurements, T: FloatArray) -> FloatArray:
+    p = measurements.p - T[:, :3, 3]
+    if measurements.R is None:
         return p
-    return np.hstack([p, log_rotation(measured.R @ T[:, :3, :3].swapaxes(-1, -2))])
+    return np.hstack([p, log_rotation(measurements.R @ T[:, :3, :3].swapaxes(-1, -2))])
 
 
-def best_fit(
-    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
+def fit_parameters(
+    model: CalibrationModel,
+    measurements: Measurements,
+    free_parameters: Sequence[int],
+    noise: Noise | None,
+    parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the parameters `kept` by least squares, from the start values `at` (p,)."""
-    problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.chain.size))
-    for _ in range(1 if noise else _ESTIMATES):
-        at = problem.minimum(at)
-        found = problem.fit(at)
-        if noise or not found.is_judged:
+    """Fit the parameters with the indices `free_parameters`, by least squares.
+
+    The start values are `parameter_values` (p,).
+    """
+    problem = _LeastSquares(
+        model,
+        measurements,
+        list(free_parameters),
+        noise or Noise(1.0, 1.0 / model.chain.characteristic_length),
+    )
+    for _ in range(1 if noise else _MAX_NOISE_ESTIMATES):
+        parameter_values = problem.minimize(parameter_values)
+        fit = problem.fit(parameter_values)
+        if noise or not fit.has_redundancy:
             break
-        old, new = problem.noise, _estimate_noise(found, model, measured)
-        is_constant = abs(new.metres - old.metres) <= _CONSTANT * old.metres and (
-            not measured.complete or abs(new.radians - old.radians) <= _CONSTANT * old.radians
+        old, new = problem.noise, _estimate_noise(fit, model, measurements)
+        is_constant = abs(new.metres - old.metres) <= _NOISE_CONVERGENCE * old.metres and (
+            not measurements.full_poses or abs(new.radians - old.radians) <= _NOISE_CONVERGENCE * old.radians
         )
         problem = replace(problem, noise=new)
         if is_constant:
             break
-    found = problem.fit(at)
-    if noise is None and not found.is_judged:
-        found = replace(found, covariance=np.full_like(found.covariance, np.inf))
-    return found
+    fit = problem.fit(parameter_values)
+    if noise is None and not fit.has_redundancy:
+        fit = replace(fit, covariance=np.full_like(fit.covariance, np.inf))
+    return fit
 
 
-def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> Noise:
+def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
     """Estimate the noise from the residuals.
 
     The residuals are divided by the noise. The estimate is therefore at least the rounding error, never 0.
     """
-    rounding = model.chain.rounding(measured.values)
+    rounding = model.chain.rounding_bound(measurements.joint_values)
 
     def of(part: slice, least: float, former: float) -> float:
-        redundancy = float(found.redundancies[:, part].sum())
-        size = float((found.errors[:, part] ** 2).sum())
-        return max(math.sqrt(size / redundancy), least) if redundancy > _ONE_OR_MORE else former
+        redundancy = float(fit.redundancies[:, part].sum())
+        size = float((fit.residuals[:, part] ** 2).sum())
+        return max(math.sqrt(size / redundancy), least) if redundancy > _MIN_REDUNDANCY else former
 
     return Noise(
-        of(slice(0, 3), rounding, found.noise.metres),
-        of(slice(3, 6), rounding / model.chain.size, found.noise.radians),
+        of(slice(0, 3), rounding, fit.noise.metres),
+        of(slice(3, 6), rounding / model.chain.characteristic_length, fit.noise.radians),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _LeastSquares:
-    """The least-squares problem for the parameters `kept`; the residuals are divided by the noise."""
+    """The least-squares problem for the free parameters; the residuals are divided by the noise."""
 
     model: CalibrationModel
-    measured: Measured
-    kept: list[int]
+    measurements: Measurements
+    free_parameters: list[int]
     noise: Noise
 
-    def residuals(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        frames = self.model.chain.frames(self.measured.values, at)
-        errors = _residuals(self.measured, frames[:, -1])
-        return (errors / self.noise.of(self.measured.complete)).ravel(), frames
+    def weighted_residuals(self, parameter_values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        frames = self.model.chain.frames(self.measurements.joint_values, parameter_values)
+        residuals = _residuals_of_poses(self.measurements, frames[:, -1])
+        return (residuals / self.noise.deviations(self.measurements.full_poses)).ravel(), frames
 
-    def jacobian(self, at: FloatArray, frames: FloatArray) -> FloatArray:
-        scale = self.noise.of(self.measured.complete)
-        _, columns = self.model.chain.columns(self.measured.values, at, frames)
-        J = columns[:, : len(scale), self.kept] / scale[:, np.newaxis]
-        return J.reshape(len(self.measured) * len(scale), len(self.kept))
+    def weighted_jacobian(self, parameter_values: FloatArray, frames: FloatArray) -> FloatArray:
+        scale = self.noise.deviations(self.measurements.full_poses)
+        _, columns = self.model.chain.poses_and_jacobian(
+            self.measurements.joint_values, parameter_values, frames
+        )
+        J = columns[:, : len(scale), self.free_parameters] / scale[:, np.newaxis]
+        return J.reshape(len(self.measurements) * len(scale), len(self.free_parameters))
 
-    def minimum(self, at: FloatArray) -> FloatArray:
-        def moved(at: FloatArray, step: FloatArray) -> FloatArray:
-            trial = at.copy()
-            trial[self.kept] += step
+    def minimize(self, parameter_values: FloatArray) -> FloatArray:
+        def add_step(parameter_values: FloatArray, step: FloatArray) -> FloatArray:
+            trial = parameter_values.copy()
+            trial[self.free_parameters] += step
             return trial
 
-        return least_squares(at, self.residuals, self.jacobian, moved)[0]
+        return least_squares(parameter_values, self.weighted_residuals, self.weighted_jacobian, add_step)[0]
 
-    def fit(self, at: FloatArray) -> Fit:
-        r, frames = self.residuals(at)
-        J = self.jacobian(at, frames)
-        k = self.noise.of(self.measured.complete).size
+    def fit(self, parameter_values: FloatArray) -> Fit:
+        r, frames = self.weighted_residuals(parameter_values)
+        J = self.weighted_jacobian(parameter_values, frames)
+        k = self.noise.deviations(self.measurements.full_poses).size
         units = np.linalg.norm(J, axis=0)
         units[units == 0.0] = 1.0
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
-        blocks = Q.reshape(len(self.measured), k, len(self.kept))
+        blocks = Q.reshape(len(self.measurements), k, len(self.free_parameters))
         redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # These are the diagonal blocks of I - H.
         own = r.reshape(-1, k)
-        inverse = np.linalg.pinv(redundancy, rcond=_UNOBSERVED, hermitian=True)
+        inverse = np.linalg.pinv(redundancy, rcond=_EIGENVALUE_CUTOFF, hermitian=True)
         chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
         redundancies = np.clip(np.einsum("sii->si", redundancy), 0.0, 1.0)
-        errors = _residuals(self.measured, frames[:, -1])
-        return Fit(at, errors, self.noise, half @ half.T, redundancies, chi_squares)
+        residuals = _residuals_of_poses(self.measurements, frames[:, -1])
+        return Fit(parameter_values, residuals, self.noise, half @ half.T, redundancies, chi_squares)
 
 
-def outliers(
-    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
+def reject_outliers(
+    model: CalibrationModel,
+    measurements: Measurements,
+    free_parameters: Sequence[int],
+    noise: Noise | None,
+    fit: Fit,
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
     # Without the outliers, there must still be more measured numbers than parameters.
-    most = len(measured) - 1 - -(-len(kept) // found.errors.shape[1])
-    most = min(int(_MOST_OUTLIERS * len(measured)), most)
-    clean = found
+    most = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
+    most = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), most)
+    clean = fit
     while len(out) < most:
-        inside = np.setdiff1d(np.arange(len(measured)), out)
+        inside = np.setdiff1d(np.arange(len(measurements)), out)
         worst = int(np.argmax(clean.chi_squares))
-        limit = quantile(1.0 - FALSE_ALARM / len(measured), clean.errors.shape[1])
+        limit = chi2_quantile(1.0 - FALSE_ALARM / len(measurements), clean.residuals.shape[1])
         if clean.chi_squares[worst] <= limit:
             break
         out.append(int(inside[worst]))
-        chosen = np.ones(len(measured), dtype=bool)
+        chosen = np.ones(len(measurements), dtype=bool)
         chosen[out] = False
-        clean = best_fit(model, measured.some(chosen), kept, noise, clean.at)
+        clean = fit_parameters(
+            model, measurements.select(chosen), free_parameters, noise, clean.parameter_values
+        )
     return tuple(sorted(out)), clean
 
 
-def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
+def select_significant(
+    changes: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
+) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
     Each step resets the least significant parameter to its old value. The covariance determines how this
@@ -401,13 +447,13 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
     resetting one of the two can make the other significant. A `fixed` parameter is always selected. Unknown
     entries of the covariance are inf.
 
-    >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
+    >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
     """
-    stays, free = np.ones(len(moved), dtype=bool), ~np.array(fixed, dtype=bool)
+    stays, free = np.ones(len(changes), dtype=bool), ~np.array(fixed, dtype=bool)
     if not np.isfinite(covariance).all():
         return ~free
-    x, C = moved.copy(), covariance.copy()
+    x, C = changes.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative; the parameter then counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], MIN_DIVISOR))
@@ -421,43 +467,45 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
     return stays
 
 
-def quantile(share: float, freedom: int) -> float:
+def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931).
 
     The relative error is at most a few per cent.
     """
-    step = 2.0 / (9.0 * freedom)
-    return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
+    step = 2.0 / (9.0 * degrees_of_freedom)
+    return degrees_of_freedom * (1.0 - step + NormalDist().inv_cdf(probability) * math.sqrt(step)) ** 3
 
 
 #: Maximum number of repetitions.
 #: Each repetition computes the base's rotation, then the positions of base and target.
-_REPETITIONS = 200
+_MAX_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
-_CONSTANT_TARGET = 1e-9
+_TARGET_CONVERGENCE = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
 #: If positions are in millimetres by mistake, this quotient is about 1000.
 _LARGEST_SPREAD = 100.0
 
 
-def start_values(model: CalibrationModel, measured: Measured) -> FloatArray:
+def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
     """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
-    at = model.chain.start.copy()
-    ends = {parameter.where for parameter in model.chain.parameters if parameter.end}
+    parameter_values = model.chain.initial_values.copy()
+    ends = {parameter.element for parameter in model.chain.parameters if parameter.is_base_or_tool}
     if not ends:
-        return at
-    T = model.chain.poses(measured.values)
+        return parameter_values
+    T = model.chain.poses(measurements.joint_values)
     free = "base" in ends, "tool" in ends
-    if measured.R is None:
-        B, X = _from_positions(T, measured.p, *free)
+    if measurements.R is None:
+        B, X = _from_positions(T, measurements.p, *free)
     else:
-        B, X = _from_poses(T, measured.p, measured.R, *free)
+        B, X = _from_poses(T, measurements.p, measurements.R, *free)
     poses = {"base": B, "tool": X}
     six = {end: [*pose[:3, 3], *euler_of("XYZ", pose[:3, :3])] for end, pose in poses.items()}
     for k, parameter in enumerate(model.chain.parameters):
-        if parameter.end:
-            at[k] = six[parameter.where][("x", "y", "z", "rx", "ry", "rz").index(parameter.what)]
-    return at
+        if parameter.is_base_or_tool:
+            parameter_values[k] = six[parameter.element][
+                ("x", "y", "z", "rx", "ry", "rz").index(parameter.name)
+            ]
+    return parameter_values
 
 
 def _from_poses(
@@ -476,13 +524,13 @@ def _from_poses(
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
     B, X = np.eye(4), np.eye(4)
-    for _ in range(_REPETITIONS if base and tool else 1):
+    for _ in range(_MAX_REPETITIONS if base and tool else 1):
         if base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
             B[:3, :3] = _nearest_rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
         B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
-        if np.linalg.norm(X[:3, 3] - before) <= _CONSTANT_TARGET * np.linalg.norm(X[:3, 3]):
+        if np.linalg.norm(X[:3, 3] - before) <= _TARGET_CONVERGENCE * np.linalg.norm(X[:3, 3]):
             break
     return B, X
 
@@ -516,11 +564,11 @@ def _translations(
     return found[:3] if base else np.zeros(3), found[-3:] if tool else np.zeros(3)
 
 
-def demand_metres(model: CalibrationModel, measured: Measured) -> None:
+def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
     """Raise InputError if measured positions spread over 100 times farther than the robot's tip positions."""
-    T = model.chain.poses(measured.values)
+    T = model.chain.poses(measurements.joint_values)
     ours, theirs = (
-        float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)
+        float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)
     )
     if ours > 0.0 and theirs > _LARGEST_SPREAD * ours:
         raise InputError(

@@ -16,7 +16,7 @@ robot's base in the instrument's frame. The path ends with the motions of `tool`
 the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
-`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
+`PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
 parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
 """
 
@@ -45,23 +45,23 @@ class Parameter:
     """One parameter of a model.
 
     Attributes:
-        where: "base", "tool", or the name of a joint.
-        what: Parameter of an origin ("x", "rx", ...), "gain", or a cell of a table ("theta", "d", ...).
+        element: "base", "tool", or the name of a joint.
+        name: Parameter of an origin ("x", "rx", ...), "gain", or a cell of a table ("theta", "d", ...).
         unit: "m", "rad", or "" for a gain.
-        end: True if `where` means the base or the tool; False if it names a joint.
+        is_base_or_tool: True if `element` means the base or the tool; False if it names a joint.
     """
 
-    where: str
-    what: str
+    element: str
+    name: str
     unit: str
-    end: bool = False
+    is_base_or_tool: bool = False
 
     def __str__(self) -> str:
-        return log_line(f"{self.where} {self.what}")
+        return log_line(f"{self.element} {self.name}")
 
 
 @dataclass(frozen=True, slots=True)
-class Drive(ElementaryMotion):
+class ParametricMotion(ElementaryMotion):
     """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
@@ -81,90 +81,116 @@ class Drive(ElementaryMotion):
 class ParametricChain:
     """The pose of a tip as a function of parameters and joint values.
 
-    Each parameter occurs once in the path. `start` (p,) contains the values in the original model.
+    Each parameter occurs once in the path. `initial_values` (p,) contains the values in the original model.
     """
 
     path: Path
     parameters: tuple[Parameter, ...]
-    start: FloatArray
+    initial_values: FloatArray
 
     @cached_property
-    def _drives(self) -> list[Drive]:
-        return [step for step in self.path.steps if isinstance(step, Drive)]
+    def _parametric_motions(self) -> list[ParametricMotion]:
+        return [step for step in self.path.steps if isinstance(step, ParametricMotion)]
 
     @property
-    def size(self) -> float:
+    def characteristic_length(self) -> float:
         """Sum (m) of the model's lengths, or 1 if it is 0; a factor that converts radians to metres."""
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
             if not isinstance(step, ElementaryMotion)
         ]
-        fitted = [abs(x) for x, p in zip(self.start, self.parameters, strict=True) if p.unit == "m"]
+        fitted = [abs(x) for x, p in zip(self.initial_values, self.parameters, strict=True) if p.unit == "m"]
         return sum(constant) + float(sum(fitted)) or 1.0
 
-    def poses(self, values: FloatArray, at: FloatArray | None = None) -> FloatArray:
-        """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
-        return self.path.poses(self._amounts(values, self.start if at is None else at)[0])
+    def poses(self, joint_values: FloatArray, parameter_values: FloatArray | None = None) -> FloatArray:
+        """Return poses (s, 4, 4) of the tip in the base for joint values (s, n)."""
+        return self.path.poses(
+            self._displacements(
+                joint_values, self.initial_values if parameter_values is None else parameter_values
+            )[0]
+        )
 
-    def frames(self, values: FloatArray, at: FloatArray) -> FloatArray:
+    def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
         """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
-        return self.path.frames(self._amounts(values, at)[0])
+        return self.path.frames(self._displacements(joint_values, parameter_values)[0])
 
-    def columns(
-        self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
+    def poses_and_jacobian(
+        self,
+        joint_values: FloatArray,
+        parameter_values: FloatArray | None = None,
+        frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        The argument `frames` contains the poses that the method `frames` returns for `values` and `at`. If it
-        is None, this method computes the poses.
+        The argument `frames` contains the poses that the method `frames` returns for the same arguments.
+        If it is None, this method computes the poses.
         """
-        amounts, factors = self._amounts(values, self.start if at is None else at)
+        amounts, factors = self._displacements(
+            joint_values, self.initial_values if parameter_values is None else parameter_values
+        )
         T, twists = self.path.pose_and_jacobian_from_frames(
             self.path.frames(amounts) if frames is None else frames
         )
-        columns = np.zeros((len(values), 6, len(self.parameters)))
-        for k, drive in enumerate(self._drives):
-            if drive.parameter is not None:
-                columns[:, :, drive.parameter] = factors[:, k, np.newaxis] * twists[:, :, k]
+        columns = np.zeros((len(joint_values), 6, len(self.parameters)))
+        for k, motion in enumerate(self._parametric_motions):
+            if motion.parameter is not None:
+                columns[:, :, motion.parameter] = factors[:, k, np.newaxis] * twists[:, :, k]
         return T, columns
 
-    def _amounts(self, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _displacements(
+        self, joint_values: FloatArray, parameter_values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the angle or length (s, motions) of each motion, and the derivatives by the parameters."""
-        factors = np.empty((len(values), len(self._drives)))
-        numbers = np.ones(len(self._drives))
-        for k, drive in enumerate(self._drives):
-            factors[:, k] = drive.sense * (1.0 if drive.joint is None else values[:, drive.joint])
-            if drive.parameter is not None:
-                numbers[k] = at[drive.parameter] + (0.0 if drive.joint is None else 1.0)
+        factors = np.empty((len(joint_values), len(self._parametric_motions)))
+        numbers = np.ones(len(self._parametric_motions))
+        for k, motion in enumerate(self._parametric_motions):
+            factors[:, k] = motion.sense * (1.0 if motion.joint is None else joint_values[:, motion.joint])
+            if motion.parameter is not None:
+                numbers[k] = parameter_values[motion.parameter] + (0.0 if motion.joint is None else 1.0)
         return factors * numbers, factors
 
-    def rounding(self, values: FloatArray) -> float:
-        """Bound the rounding error (m) of each number that `columns` returns.
+    def rounding_bound(self, joint_values: FloatArray) -> float:
+        """Bound the rounding error (m) of each number that `poses_and_jacobian` returns.
 
-        For numbers in radians, divide the returned bound by `size`.
+        For numbers in radians, divide the returned bound by `characteristic_length`.
         """
-        slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
-        slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
-        return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
+        slides = [
+            motion.joint
+            for motion in self._parametric_motions
+            if motion.joint is not None and not motion.turns
+        ]
+        slid = max((float(np.abs(joint_values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
+        total_length = self.characteristic_length + slid * len(slides)
+        return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * total_length
 
 
 #: Largest angle (rad) between two axes of a table that are treated as parallel.
 #: Parallel axes of a real arm deviate by some milliradians.
-PARALLEL = math.radians(5.0)
+PARALLEL_TOLERANCE = math.radians(5.0)
 
-FITTED = ("base", "tool", "offsets", "origins", "gains")
+PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
 #: For each parameter of an origin: name, whether it is a rotation, and index of the coordinate axis.
 #: The motions are multiplied in this order.
-SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
-_ALL = tuple(what for what, *_ in SIX)
+ORIGIN_PARAMETERS = (
+    ("x", False, 0),
+    ("y", False, 1),
+    ("z", False, 2),
+    ("rx", True, 0),
+    ("ry", True, 1),
+    ("rz", True, 2),
+)
+_ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
 #: Order of preference for revolute (True) and prismatic (False) joints.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
 #: The parameter of the joint's zero comes first. The parameters that move the joint axis follow.
 #: Then come the parameters that move only the frame, and the gain is last.
-_KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
-_ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
-_KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
+_ORIGIN_PREFERENCES = {
+    True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
+    False: ("z", "rx", "ry", "x", "y", "rz", "gain"),
+}
+_CELLS = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
+_CELL_PREFERENCES = ("theta", "a", "alpha", "beta", "d", "gain")
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +207,15 @@ class CalibrationModel:
     tip: str
     source: KinematicTree | DHTable
 
-    def end(self, which: str, at: FloatArray) -> FloatArray | None:
+    def base_or_tool_pose(self, element: str, parameter_values: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of the base or tool at parameters (p,), or None if it is not fitted."""
-        if not any(parameter.end and parameter.where == which for parameter in self.chain.parameters):
+        if not any(
+            parameter.is_base_or_tool and parameter.element == element for parameter in self.chain.parameters
+        ):
             return None
-        return self._change(which, at, end=True)
+        return self._change(element, parameter_values, is_base_or_tool=True)
 
-    def origins(self, at: FloatArray) -> dict[str, FloatArray]:
+    def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
         """Return the new origin (4, 4) of each URDF joint whose origin moved, by joint name.
 
         The origin of a locked joint does not include the value at which the joint is locked.
@@ -195,8 +223,8 @@ class CalibrationModel:
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
-        for name in dict.fromkeys(p.where for p in self.chain.parameters if not p.end):
-            change = self._change(name, at)
+        for name in dict.fromkeys(p.element for p in self.chain.parameters if not p.is_base_or_tool):
+            change = self._change(name, parameter_values)
             if (change != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
                 A = turned(joint)
@@ -204,85 +232,111 @@ class CalibrationModel:
                 found[name] = origin if joint.lock is None else origin @ inverse(joint.lock.motion)
         return found
 
-    def table(self, at: FloatArray) -> DHTable | None:
+    def table(self, parameter_values: FloatArray) -> DHTable | None:
         if not isinstance(self.source, DHTable):
             return None
-        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.chain.parameters) if not p.end}
+        cells = {
+            (p.element, p.name): float(parameter_values[k])
+            for k, p in enumerate(self.chain.parameters)
+            if not p.is_base_or_tool
+        }
 
-        def moved(row: DHRow) -> DHRow:
-            theta, d, a, alpha, beta = (cells.get((row.joint, cell), getattr(row, cell)) for cell, *_ in _ROW)
+        def update_row(row: DHRow) -> DHRow:
+            theta, d, a, alpha, beta = (
+                cells.get((row.joint, cell), getattr(row, cell)) for cell, *_ in _CELLS
+            )
             return replace(row, theta=theta, d=d, a=a, alpha=alpha, beta=beta)
 
-        rows = [moved(row) for row in self.source.rows]
-        ends = [self._change(end, at, end=True) for end in ("base", "tool")]
+        rows = [update_row(row) for row in self.source.rows]
+        ends = [self._change(end, parameter_values, is_base_or_tool=True) for end in ("base", "tool")]
         T_base, T_tool = ends[0] @ self.source.base, self.source.tool @ ends[1]
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
-    def _change(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
+    def _change(
+        self, element: str, parameter_values: FloatArray, *, is_base_or_tool: bool = False
+    ) -> FloatArray:
         """Return the (4, 4) motion that is given by the six parameters of a joint, the base or the tool."""
         parameters = enumerate(self.chain.parameters)
-        values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
+        values = {
+            p.name: float(parameter_values[k])
+            for k, p in parameters
+            if (p.element, p.is_base_or_tool) == (element, is_base_or_tool)
+        }
         motion = np.eye(4)
-        for what, turns, axis in SIX:
-            if what in values:
-                motion = motion @ elementary_pose(axis, turns, values[what])
+        for name, turns, axis in ORIGIN_PARAMETERS:
+            if name in values:
+                motion = motion @ elementary_pose(axis, turns, values[name])
         return motion
 
 
 class _ModelBuilder:
     def __init__(self, fit: Collection[str]) -> None:
         for name in fit:
-            if name not in FITTED:
-                raise UnknownNameError("set of parameters", name, FITTED)
+            if name not in PARAMETER_SETS:
+                raise UnknownNameError("set of parameters", name, PARAMETER_SETS)
         if not fit:
-            raise InputError("no parameters to fit", remedy=f"choose among {', '.join(FITTED)}")
+            raise InputError("no parameters to fit", remedy=f"choose among {', '.join(PARAMETER_SETS)}")
         self.fit = fit
-        self.steps: list[FloatArray | Drive] = []
+        self.steps: list[FloatArray | ParametricMotion] = []
         self.parameters: list[Parameter] = []
-        self.start: list[float] = []
+        self.initial_values: list[float] = []
 
-    def parameter(self, where: str, what: str, unit: str, value: float = 0.0, *, end: bool = False) -> int:
-        self.parameters.append(Parameter(where, what, unit, end))
-        self.start.append(value)
+    def add_parameter(
+        self, element: str, name: str, unit: str, value: float = 0.0, *, is_base_or_tool: bool = False
+    ) -> int:
+        self.parameters.append(Parameter(element, name, unit, is_base_or_tool))
+        self.initial_values.append(value)
         return len(self.parameters) - 1
 
-    def end(self, which: str) -> None:
-        if which in self.fit:
-            self.origin(which, _ALL, end=True)
+    def add_base_or_tool(self, element: str) -> None:
+        if element in self.fit:
+            self.add_origin(element, _ORIGIN_PARAMETER_NAMES, is_base_or_tool=True)
 
-    def origin(
-        self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False
+    def add_origin(
+        self, element: str, only: Collection[str], *, backwards: bool = False, is_base_or_tool: bool = False
     ) -> None:
         motions = [
-            Drive(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
-            for what, turns, axis in SIX
-            if what in only
+            ParametricMotion(
+                axis,
+                turns,
+                self.add_parameter(element, name, "rad" if turns else "m", is_base_or_tool=is_base_or_tool),
+            )
+            for name, turns, axis in ORIGIN_PARAMETERS
+            if name in only
         ]
         self.steps += [replace(one, sense=-1.0) for one in reversed(motions)] if backwards else motions
 
-    def joint(self, where: str, number: int, *, turns: bool, sense: float) -> Drive:
-        gain = self.parameter(where, "gain", "") if "gains" in self.fit else None
-        return Drive(2, turns, gain, number, sense)
+    def make_joint_motion(self, element: str, number: int, *, turns: bool, sense: float) -> ParametricMotion:
+        gain = self.add_parameter(element, "gain", "") if "gains" in self.fit else None
+        return ParametricMotion(2, turns, gain, number, sense)
 
-    def model(
+    def build(
         self,
         source: KinematicTree | DHTable,
         path: FrameChain | DHTable,
         ends: tuple[str, str],
-        kept: Mapping[str, tuple[str, ...]],
+        preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
-        at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
+        index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
         # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
-        owners = sorted(dict.fromkeys((p.where, p.end) for p in self.parameters), key=lambda one: not one[1])
+        owners = sorted(
+            dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]
+        )
         groups = tuple(
-            tuple(at[*owner, what] for what in kept.get(owner[0], _KEPT[True]) if (*owner, what) in at)
+            tuple(
+                index_of[*owner, what]
+                for what in preferences.get(owner[0], _ORIGIN_PREFERENCES[True])
+                if (*owner, what) in index_of
+            )
             for owner in owners
         )
-        chain = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
+        chain = ParametricChain(
+            Path(tuple(self.steps)), tuple(self.parameters), np.array(self.initial_values)
+        )
         return CalibrationModel(chain, groups, path.coupling, *ends, source)
 
 
-def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
+def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
 
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
@@ -290,7 +344,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     """
     path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
-    builder.end("base")
+    builder.add_base_or_tool("base")
     steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
@@ -298,50 +352,58 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
         if backwards:
             builder.steps.append(A)
             if joint.kind.has_axis:
-                builder.steps.append(builder.joint(joint.name, number, turns=joint.kind.turns, sense=-1.0))
-            builder.origin(joint.name, only, backwards=True)
+                builder.steps.append(
+                    builder.make_joint_motion(joint.name, number, turns=joint.kind.turns, sense=-1.0)
+                )
+            builder.add_origin(joint.name, only, backwards=True)
             builder.steps.append(inverse(joint.T_parent_joint @ A))
         else:
             builder.steps.append(joint.T_parent_joint @ A)
-            builder.origin(joint.name, only)
+            builder.add_origin(joint.name, only)
             if joint.kind.has_axis:
-                builder.steps.append(builder.joint(joint.name, number, turns=joint.kind.turns, sense=1.0))
+                builder.steps.append(
+                    builder.make_joint_motion(joint.name, number, turns=joint.kind.turns, sense=1.0)
+                )
             builder.steps.append(A.T)
         number += joint.kind.has_axis
-    builder.end("tool")
-    kept = {joint.name: _KEPT[joint.kind.turns or not joint.kind.has_axis] for joint, _ in steps}
-    return builder.model(tree, path, (base, tip), kept)
+    builder.add_base_or_tool("tool")
+    preferences = {
+        joint.name: _ORIGIN_PREFERENCES[joint.kind.turns or not joint.kind.has_axis] for joint, _ in steps
+    }
+    return builder.build(tree, path, (base, tip), preferences)
 
 
 def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> Collection[str]:
     if "origins" in fit and (joint.kind.has_axis or is_last):
-        return _ALL
+        return _ORIGIN_PARAMETER_NAMES
     own = "rz" if joint.kind.turns else "z"
     return (own,) if "offsets" in fit and joint.kind.has_axis else ()
 
 
-def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
+def make_table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a table; `fit` names the sets of parameters."""
     builder = _ModelBuilder(fit)
-    builder.end("base")
+    builder.add_base_or_tool("base")
     builder.steps.append(table.base)
     for i, row in enumerate(table.rows):
         own = "theta" if row.kind.turns else "d"
         cells = dict(zip(("a", "alpha", "d", "theta", "beta"), row.cells, strict=True))
-        without_beta = abs(math.sin(row.alpha)) > PARALLEL and not row.beta
-        motions = list[FloatArray | Drive]()
-        for cell, turns, axis in _ROW:
+        without_beta = abs(math.sin(row.alpha)) > PARALLEL_TOLERANCE and not row.beta
+        motions = list[FloatArray | ParametricMotion]()
+        for cell, turns, axis in _CELLS:
             is_fitted = "origins" in fit and not (cell == "beta" and without_beta)
             if is_fitted or ("offsets" in fit and cell == own):
                 unit = "rad" if turns else "m"
-                motions.append(Drive(axis, turns, builder.parameter(row.joint, cell, unit, cells[cell])))
+                motions.append(
+                    ParametricMotion(axis, turns, builder.add_parameter(row.joint, cell, unit, cells[cell]))
+                )
             else:
                 motions.append(elementary_pose(axis, turns, cells[cell]))
-        joint = builder.joint(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
+        joint = builder.make_joint_motion(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
         along, between = [*motions[:2], joint], motions[2:]
         standard = table.convention is DHConvention.STANDARD
         builder.steps += [*along, *between] if standard else [*between, *along]
     builder.steps.append(table.tool)
-    builder.end("tool")
-    kept = dict.fromkeys((row.joint for row in table.rows), _KEPT_CELLS)
-    return builder.model(table, table, (table.base_frame, table.tip_frame), kept)
+    builder.add_base_or_tool("tool")
+    preferences = dict.fromkeys((row.joint for row in table.rows), _CELL_PREFERENCES)
+    return builder.build(table, table, (table.base_frame, table.tip_frame), preferences)

@@ -20,13 +20,13 @@ import numpy as np
 from urdfkin.calibration.fit import (
     Fit,
     Identification,
-    Measured,
+    Measurements,
     Noise,
-    best_fit,
-    errors,
-    first_names,
+    compute_residuals,
+    estimate_start_values,
+    fit_parameters,
     identify,
-    start_values,
+    join_names,
 )
 from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
@@ -58,10 +58,10 @@ _UNCERTAIN = 5.0
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections for which the parameters are fitted again.
 #: These corrections have the smallest errors if only base and tool are computed.
-_FITTED = 4
+_MAX_FITS = 4
 #: Numbers of rows by which a correction shifts q relative to the poses.
 _SHIFTS = (1, -1, 2, -2)
-_list = partial(first_names, most=4)
+_join_names = partial(join_names, limit=4)
 
 
 @dataclass(frozen=True)
@@ -81,34 +81,34 @@ class Plausibility:
 class FitWithData:
     """A fit with its data.
 
-    `q` (s, c) contains the coordinates of the path. In the fit `before`, only base and tool are fitted.
+    `q` (s, c) contains the coordinates of the path. `base_tool_fit` fits only base and tool.
     """
 
     model: CalibrationModel
     q: FloatArray
-    measured: Measured
+    measurements: Measurements
     identification: Identification
-    before: Fit
-    fitted: Fit
+    base_tool_fit: Fit
+    full_fit: Fit
 
     @cached_property
     def reach(self) -> float:
         """The largest distance (m) of the tip from the base or any joint axis, in the original model."""
         chain = self.model.chain
-        T, columns = chain.columns(self.measured.values)
-        turning = [k for k, p in enumerate(chain.parameters) if p.what in ("rz", "theta")]
+        T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
+        turning = [k for k, p in enumerate(chain.parameters) if p.name in ("rz", "theta")]
         levers = np.linalg.norm(columns[:, :3, turning], axis=1).max(initial=0.0)
         distance = np.linalg.norm(T[:, :3, 3], axis=1).max(initial=0.0)
-        return min(chain.size, float(max(levers, distance))) or chain.size
+        return min(chain.characteristic_length, float(max(levers, distance))) or chain.characteristic_length
 
-    def deviation(self, reach: float) -> float:
+    def residual_deviation(self, reach: float) -> float:
         """Return the standard deviation (m) of the residuals; angles are multiplied by the reach."""
-        return _norm(self.fitted.errors, reach) / math.sqrt(max(self.fitted.freedom, 1.0))
+        return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
-    def too_few(self) -> list[str]:
+    def redundancy_objections(self) -> list[str]:
         """Return a message if the measured values have no redundancy, else an empty list."""
-        steps = np.round(self.measured.values / _ONE_CONFIGURATION)
-        distinct, each = len(np.unique(steps, axis=0)), self.fitted.errors.shape[1]
+        steps = np.round(self.measurements.joint_values / _ONE_CONFIGURATION)
+        distinct, each = len(np.unique(steps, axis=0)), self.full_fit.residuals.shape[1]
         rank = self.identification.rank
         if distinct * each > rank:
             return []
@@ -118,10 +118,10 @@ class FitWithData:
             f"for {rank} parameters, so the fit cannot be checked"
         ]
 
-    def misfits(self) -> Iterator[str]:
+    def misfit_objections(self) -> Iterator[str]:
         reach = self.reach
-        (metres, radians), (metres_before, _) = self.fitted.rms(), self.before.rms()
-        p = self.measured.p
+        (metres, radians), (metres_before, _) = self.full_fit.rms(), self.base_tool_fit.rms()
+        p = self.measurements.p
         spread = float(np.sqrt(((p - p.mean(axis=0)) ** 2).sum(axis=1).mean()))
         no_better = metres > _NO_BETTER_OF_REACH * reach and metres > _NO_BETTER_OF_BEFORE * metres_before
         unexplained = metres > _UNEXPLAINED_OF_REACH * reach and metres > _UNEXPLAINED_OF_SPREAD * spread
@@ -134,75 +134,81 @@ class FitWithData:
         if radians is not None and radians > _LARGE_ORIENTATION_ERROR:
             yield f"a large rms error of the orientations, {angle(radians)}"
 
-    def extreme_parameters(self) -> Iterator[str]:
+    def extreme_parameter_objections(self) -> Iterator[str]:
         tilted, gained = dict[str, str](), dict[str, str]()
         for parameter, change, least in self._changes():
-            if parameter.what in ("rx", "ry", "alpha", "beta") and least > _LARGEST_TILT:
-                tilted.setdefault(parameter.where, f"{parameter.where!r} by {angle(abs(change))}")
-            if parameter.what == "gain" and least > _LARGEST_GAIN:
-                gained[parameter.where] = f"{parameter.where!r} by {1.0 + change:.3g}"
+            if parameter.name in ("rx", "ry", "alpha", "beta") and least > _LARGEST_TILT:
+                tilted.setdefault(parameter.element, f"{parameter.element!r} by {angle(abs(change))}")
+            if parameter.name == "gain" and least > _LARGEST_GAIN:
+                gained[parameter.element] = f"{parameter.element!r} by {1.0 + change:.3g}"
         if tilted:
-            yield f"the fit tilts the axis of joint {_list(tilted.values())}"
+            yield f"the fit tilts the axis of joint {_join_names(tilted.values())}"
         if gained:
-            yield f"the fit scales the values of joint {_list(gained.values())}"
+            yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
-    def turned_zeros(self) -> list[str]:
+    def half_turn_zeros(self) -> list[str]:
         """Return the joints whose zero changed by about half a turn.
 
         A reversed sign of the next joint can cause such a change.
         """
         return [
-            f"{parameter.where!r} by {angle(abs(change))}"
+            f"{parameter.element!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()
-            if parameter.what in ("rz", "theta")
+            if parameter.name in ("rz", "theta")
             and least > _LARGEST_TILT
             and abs(abs(change) - math.pi) < _LARGEST_TILT
         ]
 
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
         """Yield each fitted parameter of a moving joint, its change, and a lower bound of |change|."""
-        model, fitted = self.model, self.fitted
+        model, fitted = self.model, self.full_fit
         near = set[str]()
-        if not self.measured.complete:
-            _, columns = model.chain.columns(self.measured.values)
+        if not self.measurements.full_poses:
+            _, columns = model.chain.poses_and_jacobian(self.measurements.joint_values)
             levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
             least = _LARGE_ERROR * self.reach
             parameters = zip(model.chain.parameters, levers.tolist(), strict=True)
-            near = {p.where for p, lever in parameters if p.what in ("rz", "theta") and lever < least}
+            near = {p.element for p, lever in parameters if p.name in ("rz", "theta") and lever < least}
         deviations = np.sqrt(np.diag(fitted.covariance))
-        for k, deviation in zip(self.identification.kept, deviations.tolist(), strict=True):
+        for k, deviation in zip(self.identification.free_parameters, deviations.tolist(), strict=True):
             parameter = model.chain.parameters[k]
-            if not parameter.end and parameter.where in model.coupling.joints and parameter.where not in near:
-                change = float(fitted.at[k] - model.chain.start[k])
+            if (
+                not parameter.is_base_or_tool
+                and parameter.element in model.coupling.joints
+                and parameter.element not in near
+            ):
+                change = float(fitted.parameter_values[k] - model.chain.initial_values[k])
                 yield parameter, change, abs(change) - _UNCERTAIN * deviation
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     """Check whether a fit is plausible, and find the likeliest mistake if it is not."""
-    few = fit.too_few()
-    misfits = [*fit.misfits(), *fit.extreme_parameters()]
+    few = fit.redundancy_objections()
+    misfits = [*fit.misfit_objections(), *fit.extreme_parameter_objections()]
     like_degrees, outside = _out_of_range(fit.model, fit.q)
     in_degrees = bool(like_degrees) and not radians
-    beyond = f"joint values of more than one turn look like degrees: joint {_list(like_degrees)}"
+    beyond = f"joint values of more than one turn look like degrees: joint {_join_names(like_degrees)}"
     ranges = [beyond] if in_degrees else []
     if outside and (misfits or few):
-        ranges.append(f"joint values are far outside the limits: joint {_list(outside)}")
+        ranges.append(f"joint values are far outside the limits: joint {_join_names(outside)}")
     objections = [*ranges, *misfits, *few]
-    metres, turn = fit.fitted.rms()
-    zeros = fit.turned_zeros()
+    metres, turn = fit.full_fit.rms()
+    zeros = fit.half_turn_zeros()
     is_suspect = metres > _SUSPECT * fit.reach or (turn or 0.0) > _SUSPECT_ORIENTATION
     better = None
     if not few and (objections or is_suspect or zeros):
-        better = _likeliest(fit, (_NOT_WORSE if objections or zeros else _BETTER) * fit.deviation(fit.reach))
+        better = _find_likeliest_correction(
+            fit, (_NOT_WORSE if objections or zeros else _BETTER) * fit.residual_deviation(fit.reach)
+        )
     if better is None:
         return Plausibility(tuple(objections), is_in_degrees=in_degrees)
     if not objections:
-        half = f"a joint zero changed by half a turn, joint {_list(zeros)}; " if zeros else ""
+        half = f"a joint zero changed by half a turn, joint {_join_names(zeros)}; " if zeros else ""
         objections = [
-            f"{half}an rms error of {fit.fitted.rms_words}, but only {better.fit.fitted.rms_words} with a"
+            f"{half}an rms error of {fit.full_fit.rms_text}, but only {better.fit.full_fit.rms_text} with a"
             " correction of the data"
         ]
-    corrected = f"after this correction the rms error is {better.fit.fitted.rms_words}"
+    corrected = f"after this correction the rms error is {better.fit.full_fit.rms_text}"
     return Plausibility(tuple(objections), f"{better.correction.reason} ({corrected})", in_degrees)
 
 
@@ -279,24 +285,24 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
 
 def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _Correction:
     names = [name for name, sign in zip(model.coupling.names, signs, strict=True) if sign < 0.0]
-    joints = _list(map(repr, names))
+    joints = _join_names(map(repr, names))
     reason = f"the signs of joints {joints} are wrong; negate their values or their axes"
     if len(names) == 1:
         reason = f"the sign of joint {joints} is wrong; negate its values or its axis"
     return _Correction(reason, q * signs)
 
 
-def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
+def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
     trials = [_Trial(fit, correction) for correction in _corrections(fit.model, fit.q)]
     trials.sort(key=lambda trial: trial.error_before)
-    for trial in trials[:_FITTED]:
+    for trial in trials[:_MAX_FITS]:
         if trial.is_plausible(limit):
             return trial
-    several = _several_signs(fit)
+    several = _find_reversed_signs(fit)
     return several if several is not None and several.is_plausible(limit) else None
 
 
-def _several_signs(fit: FitWithData) -> _Trial | None:
+def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
     """Reverse the signs of joints one by one while the error decreases.
 
     Return None if fewer than two signs are reversed.
@@ -318,33 +324,41 @@ def _several_signs(fit: FitWithData) -> _Trial | None:
 class _Trial:
     def __init__(self, original: FitWithData, correction: _Correction) -> None:
         self.original, self.correction = original, correction
-        model, poses = original.model, np.zeros(len(original.measured), dtype=bool)
+        model, poses = original.model, np.zeros(len(original.measurements), dtype=bool)
         poses[correction.first : correction.last] = True
-        chosen = original.measured.some(poses)
-        self.measured = Measured(model.coupling.values(correction.q), chosen.p, chosen.R)
-        self.start = start_values(model, self.measured)
-        errors_before = _norm(errors(model, self.measured, self.start), original.reach)
+        chosen = original.measurements.select(poses)
+        self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
+        self.start = estimate_start_values(model, self.measurements)
+        errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
         #: Error (m) per pose if only base and tool are computed from the poses.
-        self.error_before = errors_before / math.sqrt(len(self.measured))
+        self.error_before = errors_before / math.sqrt(len(self.measurements))
 
     @cached_property
     def fit(self) -> FitWithData:
-        model, measured = self.original.model, self.measured
+        model, measurements = self.original.model, self.measurements
         noise = Noise(1.0, 1.0 / self.original.reach)
-        ends = [k for k in self.original.identification.kept if model.chain.parameters[k].end]
-        before = best_fit(model, measured, ends, noise, self.start)
-        identification = identify(model, measured.values, complete=measured.complete, at=self.start)
-        fitted = best_fit(model, measured, identification.kept, noise, before.at)
-        return FitWithData(model, self.correction.q, measured, identification, before, fitted)
+        ends = [
+            k
+            for k in self.original.identification.free_parameters
+            if model.chain.parameters[k].is_base_or_tool
+        ]
+        before = fit_parameters(model, measurements, ends, noise, self.start)
+        identification = identify(
+            model, measurements.joint_values, full_poses=measurements.full_poses, parameter_values=self.start
+        )
+        fitted = fit_parameters(
+            model, measurements, identification.free_parameters, noise, before.parameter_values
+        )
+        return FitWithData(model, self.correction.q, measurements, identification, before, fitted)
 
     def is_plausible(self, limit: float) -> bool:
         try:
             fit = self.fit
         except np.linalg.LinAlgError:
             return False
-        if not fit.fitted.is_judged or fit.deviation(self.original.reach) > limit:
+        if not fit.full_fit.has_redundancy or fit.residual_deviation(self.original.reach) > limit:
             return False
-        return not [*fit.misfits(), *fit.extreme_parameters(), *fit.turned_zeros()]
+        return not [*fit.misfit_objections(), *fit.extreme_parameter_objections(), *fit.half_turn_zeros()]
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from urdfkin.calibration.calibrate import fitted_model
-from urdfkin.calibration.write_back import Rewritten
+from urdfkin.calibration.calibrate import fit_model
+from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
@@ -51,12 +51,12 @@ LINKS = {
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of random configurations for the fit of the origins, and for its check.
-_CONFIGURATIONS = 40
+_FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.
 #: The numbers in the file have nine digits, and rounding causes residuals of this size.
-_MOST_RESIDUAL = 1e-8
-_COMPARED = 1000
+_MAX_RESIDUAL = 1e-8
+_DISTANCE_SAMPLES = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
@@ -96,7 +96,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
     return pose(rotation_from_euler(sequence, six[3:]), six[:3])
 
 
-def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
+def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
     z, rows, parent = np.array([0.0, 0.0, 1.0]), [], "base"
     for joint, T in origins.items():
         child = "tool0" if joint == "wrist_3_joint" else f"{joint}_link"
@@ -105,7 +105,7 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
     return build_tree("calibration", "base", rows)
 
 
-def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
+def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
     If all six joints turn about z, as in the current ROS description, the origins in the calibration file
@@ -115,15 +115,15 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     robot = as_robot(robot)
     origins = read_calibration(path, order)
     prefix = _prefix(robot)
-    calibrated = make_chain(calibrated_tree(origins), "tool0", "base")
+    calibrated = make_chain(make_calibrated_tree(origins), "tool0", "base")
     if _all_turn_about_z(robot, prefix):
-        result = Rewritten(robot, {prefix + joint: T for joint, T in origins.items()})
+        result = UpdatedURDF(robot, {prefix + joint: T for joint, T in origins.items()})
     else:
         result = _fit_origins(robot, calibrated, f"{prefix}tool0", f"{prefix}base")
     return replace(result, certificate=_verify_written(result, calibrated, prefix))
 
 
-def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
+def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> UpdatedURDF:
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(
@@ -132,13 +132,13 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
             found=f"{len(own.names)} and {len(calibrated.joint_names)}",
             remedy="use a URDF of ur_description, which has the frames base and tool0",
         )
-    q = robot.sample(_CONFIGURATIONS, seed=_FIT_SEED)
+    q = robot.sample(_FIT_SAMPLES, seed=_FIT_SEED)
     values = own.select(robot.tree, q)
     if set(own.names) == set(calibrated.joint_names):
         values = values[:, [own.names.index(name) for name in calibrated.joint_names]]
-    found = fitted_model(robot, q, calibrated.placement(values), tip=tip, base=base, check=False)
-    residual = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
-    if residual > _MOST_RESIDUAL:
+    found = fit_model(robot, q, calibrated.placement(values), tip=tip, base=base, check=False)
+    residual = np.abs(found.full_fit.residuals).max() if found.full_fit is not None else 0.0
+    if residual > _MAX_RESIDUAL:
         raise InputError(
             "no choice of joint origins makes the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
@@ -146,7 +146,7 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
             remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
             " B.urdf",
         )
-    return found.written
+    return found.updated_urdf
 
 
 def _prefix(robot: Robot) -> str:
@@ -167,14 +167,14 @@ def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
     return all(axis.tolist() == [0.0, 0.0, 1.0] for axis in axes)
 
 
-def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
+def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) -> Certificate:
     """Compare poses of the new URDF with poses of the calibration file; Pinocchio checks the new URDF."""
-    written = result.loaded
-    q = written.sample(_CONFIGURATIONS, seed=_CHECK_SEED)
+    written = result.new_robot
+    q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
     values = q[:, [written.coordinate_names.index(prefix + joint) for joint in LINKS.values()]]
     error = float(np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - calibrated.placement(values)).max())
-    if error > _MOST_RESIDUAL:
+    if error > _MAX_RESIDUAL:
         raise InputError(
             "the URDF's frames base and tool0 differ from those of the calibration",
             where=result.robot.name,
@@ -189,8 +189,8 @@ def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> 
 
     The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
     """
-    paths = [make_chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
+    paths = [make_chain(make_calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
+    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _DISTANCE_SAMPLES)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

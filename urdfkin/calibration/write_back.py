@@ -97,7 +97,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Rewritten:
+class UpdatedURDF:
     """A robot with new joint origins (4, 4), by joint name, and Pinocchio's check of the new text."""
 
     robot: Robot
@@ -109,7 +109,7 @@ class Rewritten:
         return with_origins(self.robot.urdf.encode(), self.origins)
 
     @cached_property
-    def loaded(self) -> Robot:
+    def new_robot(self) -> Robot:
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # The first load gave these warnings.
@@ -118,10 +118,10 @@ class Rewritten:
 
     @cached_property
     def changes(self) -> Changes:
-        return diff(self.robot, self.loaded)
+        return diff(self.robot, self.new_robot)
 
     @cached_property
-    def moved(self) -> dict[str, tuple[float, float]]:
+    def displacements(self) -> dict[str, tuple[float, float]]:
         """The translation (m) and the rotation (rad) of each joint's origin."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}

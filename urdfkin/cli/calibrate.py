@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from urdfkin.calibration.calibrate import Calibration, ImplausibleError
-    from urdfkin.calibration.write_back import Rewritten
+    from urdfkin.calibration.write_back import UpdatedURDF
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
 
@@ -81,11 +81,11 @@ _FORMS = (*TEXTS, "json")
     default="m",
     help="Unit of measured positions.",
 )
-@click.option("--drop-odd", is_flag=True, help="Exclude outlier poses from the fit.")
+@click.option("--drop-outliers", is_flag=True, help="Exclude outlier poses from the fit.")
 @click.option("--radians", is_flag=True, help="Read joint angles as radians, even if they look like degrees.")
 @click.option(
     "--all",
-    "every",
+    "write_all",
     is_flag=True,
     help="Write all fitted parameters, not only those that changed by more than 2 sigma.",
 )
@@ -121,7 +121,7 @@ def calibrate_command(
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
-    from urdfkin.report.calibration import as_data, document, moved_table
+    from urdfkin.report.calibration import as_data, displacement_table, document
     from urdfkin.report.diff import lines_of
 
     check_writable(output)
@@ -130,16 +130,16 @@ def calibrate_command(
         raise InputError("--poses and --ur cannot be used together", remedy="leave out one of them")
     _reject_unused(context, sources)
     loaded = load_robot(robot)
-    found, written = None, None
+    calibration, written = None, None
     with report_compilation():
         if ur is not None:
             written = _factory_calibration(loaded, ur, order)
         else:
-            found = _fit(context, loaded)
-            written = found.written
-    data = {} if found is None else as_data(found)
+            calibration = _fit(context, loaded)
+            written = calibration.updated_urdf
+    data = {} if calibration is None else as_data(calibration)
     data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
-    report = TextDocument("") if found is None else document(found)
+    report = TextDocument("") if calibration is None else document(calibration)
     parts = list(report.parts)
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
@@ -148,36 +148,36 @@ def calibrate_command(
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 
-    if written is None or (found is not None and found.fitted is None):
+    if written is None or (calibration is not None and calibration.full_fit is None):
         answer()
-    if found is not None and found.plausibility.objections:
-        is_refused = found.plausibility.is_in_degrees or not context.params["force"]
-        say(f"urdfkin: {'error' if is_refused else 'warning'}: {_implausible(found)}", err=True)
+    if calibration is not None and calibration.plausibility.objections:
+        is_refused = calibration.plausibility.is_in_degrees or not context.params["force"]
+        say(f"urdfkin: {'error' if is_refused else 'warning'}: {_implausible(calibration)}", err=True)
         if is_refused:
             answer(code=3)
     if written.origins:
-        parts.append(moved_table(written))
+        parts.append(displacement_table(written))
     if output is not None:
-        table = None if found is None else found.table
+        table = None if calibration is None else calibration.table
         write_file(output, written.text if table is None else _as_toml(table))
         if table is None:
             parts += lines_of(replace(written.changes, sources=(loaded.source, str(output))))
-    certificate = written.certificate if found is None else found.certificate
+    certificate = written.certificate if calibration is None else calibration.certificate
     if certificate is None:
         answer()
     answer(check_line(certificate), exit_code(certificate))
 
 
-def _implausible(found: Calibration) -> ImplausibleError:
+def _implausible(calibration: Calibration) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError
 
-    if found.plausibility.is_in_degrees:
-        return ImplausibleError(found, "if these values are radians, add --radians")
-    return ImplausibleError(found, "to write this calibration anyway, add --force")
+    if calibration.plausibility.is_in_degrees:
+        return ImplausibleError(calibration, "if these values are radians, add --radians")
+    return ImplausibleError(calibration, "to write this calibration anyway, add --force")
 
 
 def _reject_unused(context: click.Context, sources: list[str]) -> None:
-    measured = ("convention", "noise", "drop_odd", "unit", "radians", "every", "force")
+    measured = ("convention", "noise", "drop_outliers", "unit", "radians", "write_all", "force")
     for unused, where, because in (
         (measured, sources != ["poses"], "without --poses"),
         (("order",), sources != ["ur"], "without --ur"),
@@ -190,7 +190,7 @@ def _reject_unused(context: click.Context, sources: list[str]) -> None:
 
 
 def _fit(context: click.Context, robot: Robot) -> Calibration:
-    from urdfkin.calibration.calibrate import fitted_model, read_poses
+    from urdfkin.calibration.calibrate import fit_model, read_poses
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
     from urdfkin.dh.table import DHTable
     from urdfkin.robot.trajectory import column_units
@@ -219,7 +219,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     with warnings.catch_warnings():
         # The ignored warnings were already shown when the robot was loaded.
         warnings.simplefilter("ignore")
-        return fitted_model(
+        return fit_model(
             source,
             q,
             T,
@@ -227,10 +227,10 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
             base=base,
             fit=[name.strip() for name in options["fit"].split(",")],
             noise=_noise(options["noise"]),
-            drop_odd=options["drop_odd"],
-            complete=not options["positions"],
+            drop_outliers=options["drop_outliers"],
+            full_poses=not options["positions"],
             radians=options["radians"],
-            every=options["every"],
+            write_all=options["write_all"],
         )
 
 
@@ -243,8 +243,13 @@ def _noise(text: str | None) -> tuple[float, float] | None:
     return metres, radians
 
 
-def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots
+def _factory_calibration(robot: Robot, path: Path, order: str) -> UpdatedURDF:
+    from urdfkin.calibration.universal_robots import (
+        ORDERS,
+        apply_factory_calibration,
+        distance,
+        read_calibration,
+    )
     from urdfkin.comparison.result import angle, length
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
@@ -253,7 +258,7 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
         f" {length(metres)} and {angle(radians)} (docs/calibration.md)",
         err=True,
     )
-    return universal_robots(robot, path, order)
+    return apply_factory_calibration(robot, path, order)
 
 
 def _as_toml(table: DHTable) -> bytes:

@@ -38,7 +38,7 @@ class Pace:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
+        seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
         # The time before the first new result is not counted, because urdfkin may compile kernels then.
         if fresh <= 0:
             self._begin = self._now()
@@ -63,7 +63,9 @@ def progress(*, as_json: bool) -> Iterator[Progress]:
 
 
 def line(state: CampaignProgress, pace: Pace) -> str:
-    earlier = f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
+    earlier = (
+        f" ({state.chunks_from_earlier_run:,} from an earlier run)" if state.chunks_from_earlier_run else ""
+    )
     robots = f"{state.robots_done:,} of {state.robots:,} robots"
     chunks = f"{state.chunks_done:,} of {state.chunks:,} chunks{earlier}"
     return f"{robots}, {chunks}; {_speed(state, pace)}{_failures(state)}; {state.label}"
@@ -164,9 +166,9 @@ def status(context: click.Context, folder: Path) -> None:
     """
     from urdfkin.validation.store import Store
 
-    store = Store.reading(folder, warn)
-    manifest, counts = store.manifest, store.counts()
-    size = len(manifest.cut)
+    store = Store.open_read_only(folder, warn)
+    manifest, counts = store.manifest, store.count_chunks()
+    size = len(manifest.chunking)
     failed = [robot for robot, (_, has_failed) in counts.items() if has_failed]
     finished = sum(done for done, _ in counts.values())
     missing = _missing_chunks(store, counts)
@@ -195,25 +197,23 @@ def status(context: click.Context, folder: Path) -> None:
 
 
 def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
-    size = len(store.manifest.cut)
+    size = len(store.manifest.chunking)
     return sum(size - done for done, has_failed in counts.values() if not has_failed)
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    if not store.has_study:
-        return
-    robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
-    from urdfkin.report.words import counted
-    from urdfkin.validation.store import AccuracyResult
+    from urdfkin.report.words import format_count
+    from urdfkin.validation.store import AccuracyStore
 
-    if (results := AccuracyResult.of(store)) is not None:
-        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
+    robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
+    if (results := AccuracyStore.open(store)) is not None:
+        say(f"accuracy study: {sum(map(results.has, robots)):,} of {format_count(len(robots), 'robot')} done")
 
 
 def _reason(store: Store, robot: int) -> str:
     from urdfkin.validation.answer import Failure
 
-    answers = (store.answer(robot, index) for index in range(len(store.manifest.cut)))
+    answers = (store.read_answer(robot, index) for index in range(len(store.manifest.chunking)))
     return next((f": {answer.reason}" for answer in answers if isinstance(answer, Failure)), "")
 
 
@@ -223,7 +223,7 @@ def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> floa
     begun = [robot for robot, (done, _) in counts.items() if done]
     seconds = []
     for robot in begun[:: max(1, len(begun) // _MOST_CHUNKS)][:_MOST_CHUNKS]:
-        answers = (store.answer(robot, index) for index in reversed(range(len(store.manifest.cut))))
+        answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
         seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
     return sum(seconds) / len(seconds) if seconds else None
 
@@ -242,17 +242,16 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
     DIR is made if it does not exist.
     """
-    from urdfkin.validation.store import AccuracyResult, Store, open_store
+    from urdfkin.validation.store import AccuracyStore, Store, open_store
 
-    others = [Store.reading(store, warn) for store in stores]
+    others = [Store.open_read_only(store, warn) for store in stores]
     with open_store(folder, others[0].manifest, warn) as whole:
         for other in others[1:]:
-            whole.check_same(other.manifest, other.folder)
+            whole.check_same_campaign(other.manifest, other.folder)
         for other in others:
             say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
-        if any(other.has_study for other in others):
-            AccuracyResult.merge(whole, others)
-        counts = whole.counts()
+        AccuracyStore.merge(whole, others)
+        counts = whole.count_chunks()
         missing = _missing_chunks(whole, counts)
         _print_accuracy_progress(whole, counts)
     say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks missing")

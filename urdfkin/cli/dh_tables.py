@@ -157,9 +157,9 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
     if request.format_ == "urdf":
         return to_urdf(table)
     if request.format_ == "svg":
-        from urdfkin.view.dh_drawing import drawing
+        from urdfkin.view.dh_drawing import draw_table_svg
 
-        return drawing(table)
+        return draw_table_svg(table)
     text = export(table, request.format_, request.units, verify=bool(request.robot.verifier.policy))
     if request.format_ in _PRINTED:
         return "\n".join([text, *_lines_below(request, table, check), ""])

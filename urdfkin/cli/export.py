@@ -39,7 +39,7 @@ from urdfkin.errors.escape import csv_value
 from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 
 if TYPE_CHECKING:
-    from urdfkin.validation.vectors import Written
+    from urdfkin.validation.vectors import VectorFiles
 
 
 @click.command(epilog="Example: urdfkin export panda --frame panda_hand --to c -o panda_hand.c")
@@ -178,7 +178,7 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
         raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")
     loaded = [load_robot(robot, verify=False) for robot in robots]
     names = [vectors.name_of(robot) for robot in loaded]
-    if len({vectors.stem(name).casefold() for name in names}) < len(names):
+    if len({vectors.file_stem(name).casefold() for name in names}) < len(names):
         raise InputError(
             "two robots have the same name, so their files would have the same name",
             found=", ".join(names),
@@ -210,7 +210,7 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
     return Answer(lambda: _document(folder, written), {"json": lambda: data, "csv": rows})
 
 
-def _document(folder: Path, written: Sequence[Written]) -> TextDocument:
+def _document(folder: Path, written: Sequence[VectorFiles]) -> TextDocument:
     rows = [(one.robot, one.files[0].name, f"{one.numbers:,}") for one in written]
     robots = counted(len(written), "robot")
     total = f"{sum(one.numbers for one in written):,} numbers of {robots} in {folder}"

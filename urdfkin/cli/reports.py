@@ -119,12 +119,12 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
-    from urdfkin.report.reading import read_document, stored_document
+    from urdfkin.report.reading import read_document, read_stored_document
     from urdfkin.validation.document import outcome_of
 
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
-    document = stored_document(results) if is_folder(results) else read_document(results)
+    document = read_stored_document(results) if is_folder(results) else read_document(results)
     check_writable(*files.values())
     failed = write_reports(document, files)
     if not failed:
@@ -209,11 +209,11 @@ def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
     every file was used. 2: a file cannot be used.
     """
-    from urdfkin.report.history import as_html, document, history
+    from urdfkin.report.history import as_html, document, read_history
 
     if not paths:
         raise click.UsageError("give reports, or a folder with reports: urdfkin report history DIR")
-    found = history(paths)
+    found = read_history(paths)
     words = shlex.join(["urdfkin", "report", "history", *map(str, paths), "--format"])
     data = {"json": lambda: found.as_dict(f"{words} json"), "html": lambda: as_html(found, f"{words} html")}
     return Answer(lambda: document(found, all_=all_), data, code=found.exit_code)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.accuracy import AccuracyStudy
     from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
-    from urdfkin.validation.store import AccuracyResult, FailedStudy, StudySettings
+    from urdfkin.validation.store import AccuracyStore, FailedStudy, StudySettings
 
 
 def study_all(
@@ -56,23 +56,23 @@ def study_all(
     belong to this part are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
-    from urdfkin.validation.chunk import Cut
+    from urdfkin.validation.chunk import Chunking
     from urdfkin.validation.store import FailedStudy
 
-    parts = chunks_of_shard(len(given), Cut(report.samples), shard)
+    parts = chunks_of_shard(len(given), Chunking(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
     studies: list[AccuracyStudy | None] = []
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
-                if not robot.tallies or parts[i].start > 0:
+                if not robot.error_stats or parts[i].start > 0:
                     continue
-                found = None if results is None else results.found(i)
+                found = None if results is None else results.read(i)
                 if found is None or (retry and isinstance(found, FailedStudy)):
-                    stamp = None if results is None else results.stamp(i)
-                    found, is_lasting = _study(given[i], settings, stamp, how)
+                    sha256 = None if results is None else results.robot_sha256(i)
+                    found, is_lasting = _study(given[i], settings, sha256, how)
                     if results is not None and is_lasting:
-                        results.keep(i, found)
+                        results.write(i, found)
                 if isinstance(found, FailedStudy):
                     say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
                 studies.append(None if isinstance(found, FailedStudy) else found)
@@ -84,21 +84,21 @@ def study_all(
 @contextmanager
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
-) -> Iterator[AccuracyResult | None]:
+) -> Iterator[AccuracyStore | None]:
     """Lock the results in `folder`, or only those of `shard`, and yield the stored accuracy results."""
     if folder is None:
         yield None
         return
-    from urdfkin.validation.store import AccuracyResult, Store, open_store
+    from urdfkin.validation.store import AccuracyStore, Store, open_store
 
-    with open_store(folder, Store.reading(folder, warn).manifest, warn, shard=shard) as store:
-        results = AccuracyResult(store, settings)
-        results.begin()
+    with open_store(folder, Store.open_read_only(folder, warn).manifest, warn, shard=shard) as store:
+        results = AccuracyStore(store, settings)
+        results.write_settings()
         yield results
 
 
 def _study(
-    source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
+    source: Robot | str, settings: StudySettings, sha256: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
     """Return the accuracy result of a robot, and whether to store this result.
 
@@ -108,13 +108,13 @@ def _study(
 
     from urdfkin.model.configuration import draw_base_motion
     from urdfkin.validation.accuracy import accuracy_study
-    from urdfkin.validation.robot_input import subject
+    from urdfkin.validation.robot_input import make_robot_input
     from urdfkin.validation.store import FailedStudy
 
     is_same = True
     try:
-        robot = subject(source, **how)
-        if is_same := stamp in (None, robot.stamp):
+        robot = make_robot_input(source, **how)
+        if is_same := sha256 in (None, robot.sha256):
             rng = np.random.default_rng([settings.seed, 1])
             base = draw_base_motion(settings.samples, rng) if settings.moving_base else None
             return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
@@ -269,10 +269,10 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         yield None
         return
     try:
-        from urdfkin.validation.cluster import connected
+        from urdfkin.validation.cluster import connect_cluster
     except ImportError:
         raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
-    with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
+    with connect_cluster(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 
 
@@ -293,14 +293,15 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    from urdfkin.report.words import counted
+    from urdfkin.report.words import format_count
 
     for robot in report.robots:
         if robot.reason is not None:
             say(f"{robot.source}: {robot.verdict}: {robot.reason}")
     results = sum(robot.results for robot in report.robots)
     say(
-        f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
-        f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
+        f"shard {shard} of {store}: {format_count(len(report.robots), 'robot')}, {results:,} results"
+        f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound,"
+        f" {report.seconds:.1f} s"
     )
     say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

@@ -148,7 +148,7 @@ def verify_command(
         from urdfkin.report.junit import functions_as_junit
 
         write_file(junit, functions_as_junit(checks))
-    codes = [(3 if check.oracle_share is None else 0) if check.agrees else 1 for check in checks]
+    codes = [(3 if check.oracle_bound_ratio is None else 0) if check.agrees else 1 for check in checks]
     code = 1 if 1 in codes else max(codes)
     return Answer(lambda: _document(checks), {"json": lambda: _data(checks)}, "", code)
 

@@ -78,7 +78,7 @@ def view_command(
     only to people who may see and move the robot. Other web pages and other users of this machine
     have no access.
     """
-    from urdfkin.view.server import has_screen, new_server, opened_page
+    from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer
 
     loaded = load_robot(robot)
@@ -110,7 +110,7 @@ def view_command(
         # Python buffers output to a pipe, so without a flush the reader gets the address late.
         sys.stdout.flush()
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
-        with opened_page(server.address) if opens else nullcontext():
+        with open_page(server.address) if opens else nullcontext():
             server.sleep_forever()
     except KeyboardInterrupt:
         server.stop()
@@ -197,7 +197,7 @@ def plot_command(
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
     from urdfkin.robot.frame_motion import frame_motion
     from urdfkin.view.figure import save
-    from urdfkin.view.plot import foot, sheet
+    from urdfkin.view.plot import caption, plot_motion
 
     check_writable(output)
     loaded = load_robot(robot)
@@ -207,8 +207,8 @@ def plot_command(
         trajectory_ = _line(loaded, start, end or "", duration, samples, seed, convention)
     with report_compilation():
         motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
-    write_file(output, save(sheet(loaded, motion, trajectory_, panels), output))
-    say(f"{loaded.name}: {motion.frame}: {foot(motion, trajectory_)}")
+    write_file(output, save(plot_motion(loaded, motion, trajectory_, panels), output))
+    say(f"{loaded.name}: {motion.frame}: {caption(motion, trajectory_)}")
     context.exit(3 if motion.not_verified is not None else 0 if motion.agrees else 1)
 
 

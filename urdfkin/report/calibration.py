@@ -6,82 +6,87 @@ from typing import Any, cast
 
 import numpy as np
 
-from urdfkin.calibration.calibrate import Calibration, doubts
-from urdfkin.calibration.write_back import Rewritten
+from urdfkin.calibration.calibrate import Calibration, list_warnings
+from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.words import counted
+from urdfkin.report.words import format_count
 from urdfkin.system.documents import plain
 
 #: Residuals below this fraction of the noise are only rounding errors.
 _ROUNDING = 0.5
 
 
-def document(found: Calibration) -> TextDocument:
-    model, identification = found.model, found.identification
-    poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
-    title = f"{found.robot.name}: {model.base} to {model.tip}{poses}"
-    identifiable, fixed = identification.rank, len(identification.still)
+def document(calibration: Calibration) -> TextDocument:
+    model, identification = calibration.model, calibration.identification
+    full_fit, written_fit = calibration.full_fit, calibration.written_fit
+    poses = f", {format_count(len(full_fit.residuals), 'pose')}" if full_fit is not None else ""
+    title = f"{calibration.robot.name}: {model.base} to {model.tip}{poses}"
+    identifiable, fixed = identification.rank, len(identification.fixed_parameters)
     parts: list[str | Table] = [
-        f"{identifiable} of {len(found.parameters)} parameters identifiable, {fixed} fixed"
+        f"{identifiable} of {len(calibration.parameters)} parameters identifiable, {fixed} fixed"
     ]
-    if found.fitted is None:
-        kept = [(str(found.parameters[k]),) for k in sorted(identification.kept)]
-        still = [(str(found.parameters[k]), reason) for k, reason in sorted(identification.still.items())]
-        parts += [Table(["identifiable"], kept), Table(["fixed", "reason"], still, left=2)]
+    if full_fit is None:
+        free_rows = [(str(calibration.parameters[k]),) for k in sorted(identification.free_parameters)]
+        fixed_rows = [
+            (str(calibration.parameters[k]), reason)
+            for k, reason in sorted(identification.fixed_parameters.items())
+        ]
+        parts += [Table(["identifiable"], free_rows), Table(["fixed", "reason"], fixed_rows, left=2)]
     else:
         rows = [
             (
-                str(found.parameters[k]),
-                _amount(found.values[k], found.parameters[k].unit),
-                _amount(found.deviations[k], found.parameters[k].unit),
-                _amount(found.written_values[k], found.parameters[k].unit)
-                if k in found.written_parameters
+                str(calibration.parameters[k]),
+                _amount(calibration.changes[k], calibration.parameters[k].unit),
+                _amount(calibration.standard_deviations[k], calibration.parameters[k].unit),
+                _amount(calibration.written_changes[k], calibration.parameters[k].unit)
+                if k in calibration.written_parameters
                 else "",
             )
-            for k in sorted(identification.kept)
+            for k in sorted(identification.free_parameters)
         ]
         parts.append(Table(["parameter", "change", "standard deviation", "written"], rows))
-    if found.fitted is None or found.before is None:
+    if full_fit is None or calibration.base_tool_fit is None:
         return TextDocument(title, parts)
-    noise = found.fitted.noise
-    said = length(noise.metres) + (f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else "")
-    every = sum(p in found.writable for p in identification.kept)
-    few = found.written_fit is not None and len(found.written_parameters) < every
+    noise = full_fit.noise
+    noise_text = length(noise.metres) + (
+        f", {angle(noise.radians)}" if full_fit.residuals.shape[1] == 6 else ""
+    )
+    every = sum(p in calibration.writable for p in identification.free_parameters)
+    few = written_fit is not None and len(calibration.written_parameters) < every
     as_written = (
-        f"; with only the written parameters: {found.written_fit.rms_words}"
-        if few and found.written_fit is not None
+        f"; with only the written parameters: {written_fit.rms_text}"
+        if few and written_fit is not None
         else ""
     )
-    parts.append(
-        f"rms error before the fit: {found.before.rms_words}; after: {found.fitted.rms_words}{as_written}"
-    )
+    before = calibration.base_tool_fit.rms_text
+    parts.append(f"rms error before the fit: {before}; after: {full_fit.rms_text}{as_written}")
     if few:
         parts.append(
-            f"written: {len(found.written_parameters)} of {every} parameters; only these changed by more than"
-            " 2 sigma"
+            f"written: {len(calibration.written_parameters)} of {every} parameters; only these changed by"
+            " more than 2 sigma"
         )
-    if not found.stated and not found.fitted.is_judged:
+    if not calibration.is_noise_stated and not full_fit.has_redundancy:
         parts.append("noise: unknown, because there are no redundant measurements")
-    elif found.stated:
-        ratio = f"{found.fitted.ratio:.3g} +- {found.fitted.spread:.2g}"
-        parts.append(f"noise: {said} as stated; the residuals are {ratio} times as large as this noise")
-    elif found.fitted.ratio < _ROUNDING:
+    elif calibration.is_noise_stated:
+        ratio = f"{full_fit.noise_ratio:.3g} +- {full_fit.noise_ratio_deviation:.2g}"
+        parts.append(f"noise: {noise_text} as stated; the residuals are {ratio} times as large as this noise")
+    elif full_fit.noise_ratio < _ROUNDING:
         parts.append("noise: none, the residuals are only rounding errors")
     else:
-        parts.append(f"noise: {said}, estimated from the residuals")
-    for name, T in (("base", found.base), ("tool", found.tool)):
+        parts.append(f"noise: {noise_text}, estimated from the residuals")
+    for name, T in (("base", calibration.base), ("tool", calibration.tool)):
         if T is not None:
-            parts.append(f"{name}: {_written(T)}")
-    for line in doubts(found):
+            parts.append(f"{name}: {_pose_text(T)}")
+    for line in list_warnings(calibration):
         parts.append(Strong(f"warning: {line}", "bold yellow"))
     return TextDocument(title, parts)
 
 
-def moved_table(written: Rewritten) -> Table:
-    rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
+def displacement_table(written: UpdatedURDF) -> Table:
+    rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.displacements.items()]
     return Table(["joint", "origin moved by", "rotated by"], rows)
 
 
@@ -91,54 +96,60 @@ def _amount(value: float, unit: str) -> str:
     return length(value) if unit == "m" else angle(value) if unit == "rad" else f"{value:.3g}"
 
 
-def _written(T: FloatArray) -> str:
+def _pose_text(T: FloatArray) -> str:
     xyz, rpy = (" ".join(f"{x:.9g}" for x in three) for three in (T[:3, 3], rpy_of(T[:3, :3]) + 0.0))
     return f'xyz="{xyz}" rpy="{rpy}"'
 
 
-def as_data(found: Calibration) -> dict[str, Any]:
-    identification = found.identification
+def as_data(calibration: Calibration) -> dict[str, Any]:
+    identification = calibration.identification
     data: dict[str, Any] = {
-        "robot": found.robot.name,
-        "source": found.robot.source,
-        "base": found.model.base,
-        "tip": found.model.tip,
+        "robot": calibration.robot.name,
+        "source": calibration.robot.source,
+        "base": calibration.model.base,
+        "tip": calibration.model.tip,
         "rank": identification.rank,
         "parameters": [
             {
-                "place": parameter.where,
-                "name": parameter.what,
+                "element": parameter.element,
+                "name": parameter.name,
                 "unit": parameter.unit or "1",
-                "fitted": k in identification.kept,
-                "moved": float(found.values[k]) if found.fitted is not None else None,
-                "deviation": found.deviations[k] if found.fitted is not None else None,
-                "written": float(found.written_values[k]) if k in found.written_parameters else None,
-                "still_because": identification.still.get(k),
+                "fitted": k in identification.free_parameters,
+                "change": float(calibration.changes[k]) if calibration.full_fit is not None else None,
+                "deviation": calibration.standard_deviations[k] if calibration.full_fit is not None else None,
+                "written": float(calibration.written_changes[k])
+                if k in calibration.written_parameters
+                else None,
+                "fixed_because": identification.fixed_parameters.get(k),
             }
-            for k, parameter in enumerate(found.parameters)
+            for k, parameter in enumerate(calibration.parameters)
         ],
     }
-    if found.fitted is None:
+    if calibration.full_fit is None:
         return data
-    fitted = found.fitted
-    names = ("base", found.base), ("tool", found.tool)
+    fitted = calibration.full_fit
+    names = ("base", calibration.base), ("tool", calibration.tool)
     data |= {
-        "covariance_of": [str(found.parameters[k]) for k in identification.kept],
+        "covariance_of": [str(calibration.parameters[k]) for k in identification.free_parameters],
         "covariance": fitted.covariance,
         "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians}
-        if found.stated or fitted.is_judged
+        if calibration.is_noise_stated or fitted.has_redundancy
         else None,
         "rms": {
             when: dict(zip(("metres", "radians"), fit.rms(), strict=True))
-            for when, fit in (("before", found.before), ("after", fitted), ("as_written", found.written_fit))
+            for when, fit in (
+                ("before", calibration.base_tool_fit),
+                ("after", fitted),
+                ("as_written", calibration.written_fit),
+            )
             if fit is not None
         },
-        "residuals": fitted.errors,
-        "odd_poses": list(found.odd),
-        "doubts": doubts(found),
-        "objections": list(found.plausibility.objections),
-        "likeliest_reason": found.plausibility.reason,
+        "residuals": fitted.residuals,
+        "outliers": list(calibration.outliers),
+        "warnings": list_warnings(calibration),
+        "objections": list(calibration.plausibility.objections),
+        "likeliest_reason": calibration.plausibility.reason,
         "placements": {name: T for name, T in names if T is not None},
-        "origins": found.origins,
+        "origins": calibration.origins,
     }
     return cast("dict[str, Any]", plain(data))

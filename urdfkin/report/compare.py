@@ -30,8 +30,17 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import format_axis, format_mimic_rule
-from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, table_lines
-from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
+from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
+from urdfkin.report.words import (
+    VERDICTS,
+    check_name,
+    format_count,
+    format_ratio,
+    format_units,
+    quantity_name,
+    summary,
+    worst,
+)
 from urdfkin.system.documents import DocumentKind, Header, plain, says
 from urdfkin.validation.document import (
     Document,
@@ -44,7 +53,7 @@ from urdfkin.validation.document import (
 )
 from urdfkin.verify.oracles import versions
 
-_LONGEST = 200
+_MAX_LENGTH = 200
 #: Displayed poses are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
@@ -58,12 +67,12 @@ def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Itera
             yield f"joint {name}", was["kind"] if was else "", now["kind"] if now else ""
             continue
         for aspect, first, second in _joint_changes(was, now):
-            yield f"joint {name}, {aspect}", shortened(first, _LONGEST), shortened(second, _LONGEST)
+            yield f"joint {name}, {aspect}", shorten(first, _MAX_LENGTH), shorten(second, _MAX_LENGTH)
     if old is not None and new is not None:
         for entry, what in (("base", "base frame"), ("tip", "tip frame"), ("coordinates", "coordinates")):
             frames = dict(old)[entry], dict(new)[entry]
             if frames[0] != frames[1]:
-                yield what, shortened(_names(frames[0]), _LONGEST), shortened(_names(frames[1]), _LONGEST)
+                yield what, shorten(_names(frames[0]), _MAX_LENGTH), shorten(_names(frames[1]), _MAX_LENGTH)
 
 
 def _joints(model: ReportedModel | None) -> dict[str, ReportedJoint]:
@@ -109,46 +118,50 @@ def _names(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def document(old: Document, new: Document, found: ReportComparison) -> TextDocument:
+def document(old: Document, new: Document, comparison: ReportComparison) -> TextDocument:
     parts: list[str | Table] = [
         f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
     ]
-    rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in figures(old, new)]
+    rows = [[quantity_name(name), _cell(a), _cell(b)] for name, a, b in worst_by_quantity(old, new)]
     parts.append(Table(["worst, eps*scale", "old", "new"], rows))
-    for change in sorted(found.changes, key=lambda change: not change.regression):
+    for change in sorted(comparison.changes, key=lambda change: not change.regression):
         parts.append(Strong(f"REGRESSION {change}", "bold red") if change.regression else str(change))
-    style = "bold red" if found.regressions else "bold green"
-    return TextDocument("", [*parts, Strong(f"{verdict(found)} ({_exit(found)})", style)])
+    style = "bold red" if comparison.regressions else "bold green"
+    return TextDocument("", [*parts, Strong(f"{verdict(comparison)} ({_describe_exit(comparison)})", style)])
 
 
-def verdict(found: ReportComparison) -> str:
-    if found.regressions:
-        return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
-    return f"no regression, {counted(len(found.changes), 'change')}"
+def verdict(comparison: ReportComparison) -> str:
+    if comparison.regressions:
+        regressions = format_count(len(comparison.regressions), "regression")
+    else:
+        regressions = "no regression"
+    return f"{regressions}, {format_count(len(comparison.changes), 'change')}"
 
 
-def _exit(found: ReportComparison) -> str:
-    if found.regressions:
+def _describe_exit(comparison: ReportComparison) -> str:
+    if comparison.regressions:
         return "exit 1: a regression"
-    return "exit 0: changes without a regression" if found.changes else "exit 0"
+    return "exit 0: changes without a regression" if comparison.changes else "exit 0"
 
 
-def markdown_of(old: Document, new: Document, found: ReportComparison, limit: int = LIMIT) -> str:
-    mark = "❌" if found.regressions else "✅"
-    worst_rows = ((text(quantity_name(name)), _cell(a), _cell(b)) for name, a, b in figures(old, new))
+def markdown_of(old: Document, new: Document, comparison: ReportComparison, limit: int = LIMIT) -> str:
+    mark = "❌" if comparison.regressions else "✅"
+    worst_rows = (
+        (text(quantity_name(name)), _cell(a), _cell(b)) for name, a, b in worst_by_quantity(old, new)
+    )
     lines = [
-        f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}",
+        f"## {mark} {verdict(comparison)[0].upper()}{verdict(comparison)[1:]}",
         "",
         *table_lines(["worst, eps·scale", "old", "new"], worst_rows, left=[0]),
         "",
-        *(table_lines(["", "changed value", "old", "new"]) if found.changes else []),
+        *(table_lines(["", "changed value", "old", "new"]) if comparison.changes else []),
     ]
-    room = limit - sum(len(line) + 1 for line in lines) - 100
-    rows = [_row(change) for change in sorted(found.changes, key=lambda change: not change.regression)]
-    shown = count_within(rows, room)
+    limit_of_rows = limit - sum(len(line) + 1 for line in lines) - 100
+    rows = [_row(change) for change in sorted(comparison.changes, key=lambda change: not change.regression)]
+    shown = count_within(rows, limit_of_rows)
     lines += rows[:shown]
     if shown < len(rows):
-        lines += ["", f"{counted(len(rows) - shown, 'further change')} left out: the comment is full."]
+        lines += ["", f"{format_count(len(rows) - shown, 'further change')} left out: the comment is full."]
     return "\n".join([*lines, ""])
 
 
@@ -156,21 +169,21 @@ def _row(change: ReportChange) -> str:
     where = f"{change.robot}: " if change.robot else ""
     cells = [where + change.what, change.old, change.new]
     mark = "❌ regression" if change.regression else ""
-    return row_line([mark, *(text(shortened(cell, 300)) for cell in cells)])
+    return row_line([mark, *(text(shorten(cell, 300)) for cell in cells)])
 
 
 def _cell(value: Units | str) -> str:
-    return value if isinstance(value, str) else units(value)
+    return value if isinstance(value, str) else format_units(value)
 
 
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Growth by a smaller factor is normal, because the samples are random.
-FACTOR = 2.0
+GROWTH_FACTOR = 2.0
 #: If a disagreement (in eps * scale) grows to at most this number, the growth is not a regression.
 #: A single rounding error can be as large.
-FLOOR = 2.0
+GROWTH_FLOOR = 2.0
 #: If the ratio of a disagreement to its bound grows to at most this number, the growth is not a regression.
-_SHARE_FLOOR = 0.1
+_BOUND_RATIO_FLOOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +259,7 @@ COMPARISON = DocumentKind(
 )
 
 
-def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
+def compare(old: Document, new: Document, factor: float = GROWTH_FACTOR) -> ReportComparison:
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
@@ -273,8 +286,8 @@ def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Ite
 
 
 def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChange]:
-    before, after = by_source(old), by_source(new)
-    renamed = renamed_files(before, after)
+    before, after = robots_by_source(old), robots_by_source(new)
+    renamed = find_renamed_files(before, after)
     for source in dict.fromkeys([*before, *after]):
         if source in renamed:
             yield ReportChange(source, "file", source, renamed[source])
@@ -290,7 +303,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
             yield from _robot(source, before[source], after[source], factor)
 
 
-def by_source(document: Document) -> dict[str, ReportedRobot]:
+def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
     """Return the robots of a report by source.
 
     If several robots have the same source, the function adds numbers: `ur5`, `ur5 (2)`.
@@ -305,7 +318,9 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
     return named
 
 
-def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
+def find_renamed_files(
+    before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
+) -> dict[str, str]:
     """Return {old source: new source} if exactly one missing and one new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
@@ -370,22 +385,22 @@ def _check(
         yield change(lambda c: f"{c['results']:,} results", True)
     if old["bound"] != new["bound"]:
         wider = any((b or 0.0) > (a or 0.0) for a, b in zip(old["bound"], new["bound"], strict=True))
-        yield change(lambda c: f"bound {_ends(c)} eps*scale", same_joints and wider)
-    grew = _grew(old["worst"], new["worst"], factor)
-    if grew or _grew(new["worst"], old["worst"], factor):
-        yield change(lambda c: f"{units(c['worst'])} eps*scale", grew)
+        yield change(lambda c: f"bound {_bound_range(c)} eps*scale", same_joints and wider)
+    grew = _has_grown(old["worst"], new["worst"], factor)
+    if grew or _has_grown(new["worst"], old["worst"], factor):
+        yield change(lambda c: f"{format_units(c['worst'])} eps*scale", grew)
 
-    was, now = old["share_of_bound"], new["share_of_bound"]
-    grew = _grew(was, now, factor, _SHARE_FLOOR)
-    if grew or _grew(now, was, factor, _SHARE_FLOOR):
-        yield change(lambda c: f"{percent(c['share_of_bound'])} of the bound", grew)
+    was, now = old["bound_ratio"], new["bound_ratio"]
+    grew = _has_grown(was, now, factor, _BOUND_RATIO_FLOOR)
+    if grew or _has_grown(now, was, factor, _BOUND_RATIO_FLOOR):
+        yield change(lambda c: f"{format_ratio(c['bound_ratio'])} of the bound", grew)
 
 
-def _ends(check: ReportedCheck) -> str:
+def _bound_range(check: ReportedCheck) -> str:
     return " to ".join("none" if end is None else f"{end:g}" for end in check["bound"])
 
 
-def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
+def _has_grown(old: Units, new: Units, factor: float, floor: float = GROWTH_FLOOR) -> bool:
     if old is None:
         return False
     return new is None or (new > floor and new > factor * old)
@@ -404,7 +419,7 @@ def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[R
             yield ReportChange(source, key, str(before or ""), str(after or ""))
 
 
-def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
+def worst_by_quantity(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
     return [(name, _worst(old, name), _worst(new, name)) for name in names]
 

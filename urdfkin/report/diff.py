@@ -10,8 +10,8 @@ from urdfkin.comparison.diff import Changes, ModelChange, motion_words, word
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
-from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, table_lines
-from urdfkin.report.words import counted
+from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
+from urdfkin.report.words import format_count
 from urdfkin.system.documents import plain
 
 HEADS = ("element", "what", "old", "new", "alone")
@@ -25,7 +25,7 @@ def headline(found: Changes) -> str:
         rounding = f", apart from rounding to single precision{most}"
     if not found:
         return f"nothing changed{rounding}"
-    head = counted(len(found.changes), "change") + rounding
+    head = format_count(len(found.changes), "change") + rounding
     if found.total is None:
         return f"{head}, no effect on motion" if not any(c.moves for c in found.changes) else head
     return f"{head}; together they {motion_words(found.total)}"
@@ -74,7 +74,7 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
         old, new = ("" if value is None else word(value) for value in (change.old, change.new))
         new = change.size or new
         if longest is not None:
-            old, new = shortened(old, longest), shortened(new, longest)
+            old, new = shorten(old, longest), shorten(new, longest)
         cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
         rows.append((*cells, motion))
     return rows
@@ -88,7 +88,7 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
     shown = count_within(rows, limit - sum(map(len, lines)) - 200)
     lines += rows[:shown]
     if shown < len(rows):
-        lines += ["", f"{counted(len(rows) - shown, 'more change')} not shown."]
+        lines += ["", f"{format_count(len(rows) - shown, 'more change')} not shown."]
     return "\n".join([*lines, ""])
 
 

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
+from urdfkin.report.words import (
+    checks_of_quantity,
+    format_units,
+    quantities,
+    quantity_name,
+    worst,
+    worst_cell,
+)
 from urdfkin.validation.document import Chain, ReportedCheck, ReportedDHTable, ReportedModel, ReportedRobot
 from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 
@@ -34,13 +41,12 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
     with style():
         figure = new_figure(5.6, 0.6 + 0.4 * len(names))
         axes = figure.add_subplot()
-        right = _right(robot["checks"], edges)
+        right = _right_limit(robot["checks"], edges)
         for row, name in enumerate(names):
-            _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges), right)
+            _draw_row(axes, len(names) - 1 - row, checks_of_quantity(robot, name), np.asarray(edges), right)
         _decorate(axes, names, right)
         descriptions = (
-            f"{quantity_name(name)}: worst {units(worst(c['worst'] for c in of_quantity(robot, name)))}"
-            for name in names
+            f"{quantity_name(name)}: worst {worst_cell(checks_of_quantity(robot, name))}" for name in names
         )
         return inline_svg(
             figure,
@@ -51,12 +57,14 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
         )
 
 
-def _right(checks: Sequence[ReportedCheck], edges: Sequence[float]) -> float:
+def _right_limit(checks: Sequence[ReportedCheck], edges: Sequence[float]) -> float:
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
 
-def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarray, right: float) -> None:
+def _draw_row(
+    axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarray, right: float
+) -> None:
     counts = np.sum([check["histogram"] for check in checks], axis=0)
     results = counts.sum()
     first = int(np.searchsorted(edges, _LEFT))
@@ -69,11 +77,11 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
         axes.stairs(tops, at, baseline=base, fill=True, color=FIRST, alpha=0.85, linewidth=0, zorder=3)
     exact = counts[: first + 1].sum() / results if results else 0.0
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
-    _bound(axes, base, checks)
+    _draw_bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
     # A result beyond the range of the plot is drawn as a mark at the plot's right end.
     if largest is None or largest > right:
-        text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
+        text = "✗ not finite" if largest is None else f"✗ {format_units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}
         axes.annotate(text, (1.0, base + 0.13), fontsize=8, weight="bold", color=THIRD, zorder=6, **place)
     elif largest:
@@ -86,7 +94,7 @@ def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any)
     axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
 
 
-def _bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
+def _draw_bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
     lows = [low for low, _ in (check["bound"] for check in checks) if low is not None]
     highs = [high for _, high in (check["bound"] for check in checks) if high]
     if lows and highs:

@@ -18,10 +18,18 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.display import Strong, Table, TextDocument
-from urdfkin.report.compare import ChangeEntry, ReportChange, by_source, compare, renamed_files
-from urdfkin.report.html import rendered, when
-from urdfkin.report.reading import checked, stored_document
-from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, utc, worst
+from urdfkin.report.compare import ChangeEntry, ReportChange, compare, find_renamed_files, robots_by_source
+from urdfkin.report.html import format_date, render_template
+from urdfkin.report.reading import check_document, read_stored_document
+from urdfkin.report.words import (
+    VERDICTS,
+    bound_ratio_of,
+    format_count,
+    format_ratio,
+    format_units,
+    utc,
+    worst,
+)
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
 from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
 from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
@@ -30,10 +38,10 @@ from urdfkin.verify.oracles import versions
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
 #: Number of latest runs that have a mark on a terminal, and number of latest runs in the charts of the page.
-MARKED, CHARTED = 20, 60
+MARKED_RUNS, CHARTED_RUNS = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
-_LISTED = 500
+_MAX_LISTED = 500
 #: Symbol of each verdict; the empty verdict means that the run did not include the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
@@ -52,7 +60,7 @@ class ValidationRun(TypedDict):
     robots: Annotated[Count, says("Number of robots.")]
     results: Annotated[Count, says("Number of compared results.")]
     failed: Annotated[Count, says("Number of results outside their bound.")]
-    share_of_bound: Units
+    bound_ratio: Units
     versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
         list[ChangeEntry], says("Changes since the previous run, as `urdfkin report compare` lists them.")
@@ -71,7 +79,7 @@ class Point(TypedDict):
     results: Annotated[Count, says("Number of compared results.")]
     failed: Annotated[Count, says("Number of results outside their bound.")]
     worst: Units
-    share_of_bound: Annotated[
+    bound_ratio: Annotated[
         float | None,
         says("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
     ]
@@ -141,19 +149,19 @@ class History:
         return cast("HistoryDocument", plain(document))
 
 
-def history(paths: Sequence[Path]) -> History:
+def read_history(paths: Sequence[Path]) -> History:
     """Read reports, folders of `validate --store`, and folders that contain reports.
 
     Raise InputError if no report is usable, or if there are too many reports or files.
     """
-    found = History()
+    history = History()
     before: Document | None = None
-    for file, report in _in_order(list(_files(paths)), found):
-        found.runs.append(_run(file, report, before))
-        _add(found, before, report)
+    for file, report in _in_order(list(_files(paths)), history):
+        history.runs.append(_run(file, report, before))
+        _add_robots(history, before, report)
         before = report
-    if not found.runs:
-        some = "; ".join(f"{one['file']}: {one['reason']}" for one in found.unusable[:3])
+    if not history.runs:
+        some = "; ".join(f"{one['file']}: {one['reason']}" for one in history.unusable[:3])
         raise InputError(
             "no report to show",
             where=", ".join(shortened(path) for path in paths[:3]),
@@ -163,10 +171,10 @@ def history(paths: Sequence[Path]) -> History:
 
     def rank(item: tuple[str, list[Point]]) -> tuple[bool, int]:
         latest = item[1][-1]
-        return latest["run"] != len(found.runs) - 1, VERDICTS.index(latest["verdict"])
+        return latest["run"] != len(history.runs) - 1, VERDICTS.index(latest["verdict"])
 
-    found.robots = dict(sorted(found.robots.items(), key=rank))
-    return found
+    history.robots = dict(sorted(history.robots.items(), key=rank))
+    return history
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
@@ -202,46 +210,49 @@ def _in_folder(folder: Path) -> Iterator[Path]:
         yield from (here / name for name in sorted(names) if name.endswith(".json"))
 
 
-def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield reports in the order of start times; add other files to `found.unusable` or `found.repeated`."""
+def _in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
+    """Yield reports in the order of start times.
+
+    Other files are added to `history.unusable` or `history.repeated`.
+    """
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
             starts.append((*_start(path), path))
         except UrdfkinError as error:
-            found.unusable.append(_unused(path, error))
+            history.unusable.append(_make_unused(path, error))
     seen = dict[str, str]()
     for _, _, path in sorted(starts):
         try:
-            document = _read(path)
+            document = _read_report(path)
         except UrdfkinError as error:
-            found.unusable.append(_unused(path, error))
+            history.unusable.append(_make_unused(path, error))
             continue
         run = repr([document[key] for key in ("started", "command", "seconds", "sha256")])
         digest = hashlib.sha256(run.encode(errors="replace")).hexdigest()
         if digest in seen:
-            found.repeated.append({"file": str(path), "reason": f"the same run as {seen[digest]}"})
+            history.repeated.append({"file": str(path), "reason": f"the same run as {seen[digest]}"})
             continue
         seen[digest] = str(path)
         yield str(path), document
 
 
-def _unused(path: Path, error: UrdfkinError) -> Unused:
+def _make_unused(path: Path, error: UrdfkinError) -> Unused:
     return {"file": str(path), "reason": str(error).removeprefix(f"{path}: ")}
 
 
 def _start(path: Path) -> tuple[float, str]:
     """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
-    data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
+    data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)
     return moment.timestamp() if moment else math.inf, text
 
 
-def _read(path: Path) -> Document:
+def _read_report(path: Path) -> Document:
     if is_folder(path):
-        return stored_document(path)
-    return checked(parse_json(read_bytes(path, MOST), str(path)), str(path))
+        return read_stored_document(path)
+    return check_document(parse_json(read_bytes(path, MOST), str(path)), str(path))
 
 
 def _run(file: str, document: Document, before: Document | None) -> ValidationRun:
@@ -256,19 +267,19 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
         "robots": len(robots),
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
-        "share_of_bound": worst(map(share_of, robots)),
+        "bound_ratio": worst(map(bound_ratio_of, robots)),
         "versions": document["versions"],
         "changes": cast("list[ChangeEntry]", plain(compare(before, document).changes)) if before else [],
     }
 
 
-def _add(found: History, before: Document | None, document: Document) -> None:
+def _add_robots(history: History, before: Document | None, document: Document) -> None:
     """Add the robots of the latest run; the history of a renamed file continues under the new name."""
-    robots = by_source(document)
-    for old, new in renamed_files(by_source(before) if before else {}, robots).items():
-        found.robots[new] = found.robots.pop(old)
+    robots = robots_by_source(document)
+    for old, new in find_renamed_files(robots_by_source(before) if before else {}, robots).items():
+        history.robots[new] = history.robots.pop(old)
     for source, robot in robots.items():
-        found.robots.setdefault(source, []).append(_point(len(found.runs) - 1, source, robot))
+        history.robots.setdefault(source, []).append(_point(len(history.runs) - 1, source, robot))
 
 
 def _point(run: int, source: str, robot: ReportedRobot) -> Point:
@@ -285,90 +296,90 @@ def _point(run: int, source: str, robot: ReportedRobot) -> Point:
         "results": robot["results"],
         "failed": robot["failed"],
         "worst": worst(check["worst"] for check in robot["checks"]),
-        "share_of_bound": share_of(robot),
+        "bound_ratio": bound_ratio_of(robot),
         "errors": counts["error"],
         "warnings": counts["warning"],
         "notes": counts["note"],
     }
 
 
-def document(found: History, *, all_: bool = False) -> TextDocument:
+def document(history: History, *, all_: bool = False) -> TextDocument:
     some = None if all_ else SHOWN
-    first = 0 if all_ else max(0, len(found.runs) - SHOWN)
+    first = 0 if all_ else max(0, len(history.runs) - SHOWN)
     runs = [
         [
             f"{k}", _date(run), run["verdict"], f"{run['robots']:,}", f"{run['results']:,}",
-            f"{run['failed']:,}", _share(run),
+            f"{run['failed']:,}", _ratio_cell(run),
             *(run["versions"].get(name, "?") for name in ("urdfkin", "pin")),
         ]
-        for k, run in enumerate(found.runs[first:], first + 1)
+        for k, run in enumerate(history.runs[first:], first + 1)
     ]  # fmt: skip
     heads = ["run", "started", "verdict", "robots", "results", "outside", "of bound", "urdfkin", "pin"]
     parts: list[str | Table] = [Table(heads, runs, left=(1, 2))]
-    grouped = _changes_by_source(found)
+    grouped = _changes_by_source(history)
     rows = [
         [
-            robot, marks(found, points), points[-1]["verdict"],
-            units(points[-1]["worst"], compared=points[-1]["results"] > 0),
-            _share(points[-1]), f"{points[-1]['errors']}", f"{points[-1]['warnings']}",
+            robot, verdict_marks(history, points), points[-1]["verdict"],
+            format_units(points[-1]["worst"], compared=points[-1]["results"] > 0),
+            _ratio_cell(points[-1]), f"{points[-1]['errors']}", f"{points[-1]['warnings']}",
             f"{len(_changes_of(grouped, points))}",
         ]
-        for robot, points in found.robots.items()
+        for robot, points in history.robots.items()
     ]  # fmt: skip
     heads = ["robot", "runs", "latest", "worst", "of bound", "errors", "warnings", "changes"]
     parts += ["", Table(heads, rows, left=(0, 1, 2))]
     lines = [
         (Strong(words, "bold red") if change["regression"] else words)
-        for run, change in changes(found)[:some]
-        for words in [f"run {run + 1}, {words_of(change)}"]
+        for run, change in list_changes(history)[:some]
+        for words in [f"run {run + 1}, {describe_change(change)}"]
     ]
-    more = len(changes(found)) - len(lines)
+    more = len(list_changes(history)) - len(lines)
     parts += ["", "changes, the latest first:", *lines] if lines else ["", "no changes between the runs"]
     parts += [f"... and {more:,} more: --all shows them"] if more else []
-    parts += [Strong(f"not used: {one['file']}: {one['reason']}", "bold yellow") for one in found.unusable]
-    parts += [f"not counted: {one['file']}: {one['reason']}" for one in found.repeated]
-    good = found.runs[-1]["verdict"] == "verified"
-    return TextDocument("", [*parts, Strong(headline(found), f"bold {'green' if good else 'red'}")])
+    parts += [Strong(f"not used: {one['file']}: {one['reason']}", "bold yellow") for one in history.unusable]
+    parts += [f"not counted: {one['file']}: {one['reason']}" for one in history.repeated]
+    good = history.runs[-1]["verdict"] == "verified"
+    return TextDocument("", [*parts, Strong(headline(history), f"bold {'green' if good else 'red'}")])
 
 
-def headline(found: History) -> str:
+def headline(history: History) -> str:
     """State the latest verdict, and how many runs directly before had the same verdict.
 
     >>> headline(History([{"verdict": v} for v in ("disagrees", "verified", "verified")]))
     '3 runs; latest verdict: verified, as in the run before'
     """
-    verdicts = [run["verdict"] for run in found.runs]
+    verdicts = [run["verdict"] for run in history.runs]
     same = next((k for k, one in enumerate(reversed(verdicts)) if one != verdicts[-1]), len(verdicts))
     if len(verdicts) == 1:
         return f"1 run: {verdicts[0]}"
     if same == 1:
-        return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, before: {verdicts[-2]}"
+        return f"{format_count(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, before: {verdicts[-2]}"
     before = "the run before" if same == 2 else f"the {same - 1:,} runs before"
-    return f"{counted(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, as in {before}"
+    return f"{format_count(len(verdicts), 'run')}; latest verdict: {verdicts[-1]}, as in {before}"
 
 
-def marks(found: History, points: Sequence[Point]) -> str:
-    return "".join(MARKS[verdict] for verdict in _latest_verdicts(found, points))
+def verdict_marks(history: History, points: Sequence[Point]) -> str:
+    return "".join(MARKS[verdict] for verdict in _latest_verdicts(history, points))
 
 
-def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
+def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
     verdicts = {point["run"]: point["verdict"] for point in points}
-    last = len(found.runs)
-    return [verdicts.get(run, "") for run in range(max(0, last - MARKED), last)]
+    last = len(history.runs)
+    return [verdicts.get(run, "") for run in range(max(0, last - MARKED_RUNS), last)]
 
 
-def changes(found: History) -> list[tuple[int, ChangeEntry]]:
+def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
     """Return pairs (index of the run, change).
 
     The latest run is first. In each run, the regressions are first.
     """
-    found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
-    return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
+    all_changes = [(k, change) for k, run in enumerate(history.runs) for change in run["changes"]]
+    return sorted(all_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 
 
-def _changes_by_source(found: History) -> ChangesBySource:
+def _changes_by_source(history: History) -> ChangesBySource:
     grouped: ChangesBySource = {}
-    for run, change in changes(found):
+    for run, change in list_changes(history):
         grouped.setdefault(change["robot"], []).append((run, change))
     return grouped
 
@@ -378,13 +389,13 @@ def _changes_of(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple
     return [one for source in sources for one in grouped.get(source, [])]
 
 
-def words_of(change: ChangeEntry) -> str:
+def describe_change(change: ChangeEntry) -> str:
     words = str(ReportChange(**change))
     return f"REGRESSION {words}" if change["regression"] else words
 
 
-def _share(one: ValidationRun | Point) -> str:
-    return percent(one["share_of_bound"]) if one["results"] else ""
+def _ratio_cell(one: ValidationRun | Point) -> str:
+    return format_ratio(one["bound_ratio"]) if one["results"] else ""
 
 
 def _date(run: ValidationRun) -> str:
@@ -392,38 +403,38 @@ def _date(run: ValidationRun) -> str:
     return moment.isoformat(" ", "minutes")[:16] if moment else run["started"][:16].replace("T", " ")
 
 
-def as_html(found: History, command: str | None = None) -> str:
+def as_html(history: History, command: str | None = None) -> str:
     """Return a page with charts; the template escapes all names."""
-    grouped = _changes_by_source(found)
-    return rendered(
+    grouped = _changes_by_source(history)
+    return render_template(
         "history.html.j2",
-        headline=headline(found),
-        runs=found.runs,
-        last=found.runs[-1],
-        dates=[_date(run) for run in found.runs],
-        when=when(found.runs[-1]["started"]),
-        charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
-        stacks=_stacks(found),
+        headline=headline(history),
+        runs=history.runs,
+        last=history.runs[-1],
+        dates=[_date(run) for run in history.runs],
+        when=format_date(history.runs[-1]["started"]),
+        charted=range(max(0, len(history.runs) - CHARTED_RUNS), len(history.runs)),
+        stacks=_stacks(history),
         height=_height,
-        robots=[_robot(found, robot, points, grouped) for robot, points in found.robots.items()],
-        changes=changes(found)[:SHOWN],
-        total=len(changes(found)),
-        unusable=found.unusable,
-        repeated=found.repeated,
+        robots=[_robot(history, robot, points, grouped) for robot, points in history.robots.items()],
+        changes=list_changes(history)[:SHOWN],
+        total=len(list_changes(history)),
+        unusable=history.unusable,
+        repeated=history.repeated,
         marks=MARKS,
-        listed=_LISTED,
-        units=units,
-        share=_share,
+        listed=_MAX_LISTED,
+        units=format_units,
+        share=_ratio_cell,
         command=command,
         versions=versions(),
     )
 
 
-def _stacks(found: History) -> list[dict[str, Counter[str]]]:
+def _stacks(history: History) -> list[dict[str, Counter[str]]]:
     stacks: list[dict[str, Counter[str]]] = [
-        {"verdicts": Counter(), "findings": Counter()} for _ in found.runs
+        {"verdicts": Counter(), "findings": Counter()} for _ in history.runs
     ]
-    for points in found.robots.values():
+    for points in history.robots.values():
         for point in points:
             stack = stacks[point["run"]]
             stack["verdicts"][point["verdict"]] += 1
@@ -431,26 +442,26 @@ def _stacks(found: History) -> list[dict[str, Counter[str]]]:
     return stacks
 
 
-def _height(share: Units) -> float:
+def _height(ratio: Units) -> float:
     """Return the height of a bar (%) on a logarithmic axis from a thousandth of the bound to the bound.
 
     >>> [_height(x) for x in (0.0, 0.001, 1.0, 7.0, None)]
     [2.0, 2.0, 100.0, 100.0, 100.0]
     """
-    if share is None or share >= 1.0:
+    if ratio is None or ratio >= 1.0:
         return 100.0
-    return max(2.0, 100.0 * (1.0 - math.log10(share) / _LOWEST)) if share else 2.0
+    return max(2.0, 100.0 * (1.0 - math.log10(ratio) / _LOWEST)) if ratio else 2.0
 
 
-def _robot(found: History, robot: str, points: Sequence[Point], grouped: ChangesBySource) -> dict[str, Any]:
-    verdicts, own_changes = _latest_verdicts(found, points), _changes_of(grouped, points)
+def _robot(history: History, robot: str, points: Sequence[Point], grouped: ChangesBySource) -> dict[str, Any]:
+    verdicts, own_changes = _latest_verdicts(history, points), _changes_of(grouped, points)
     return {
         "name": robot,
-        "points": points[: -_LISTED - 1 : -1],
+        "points": points[: -_MAX_LISTED - 1 : -1],
         "last": points[-1],
         "verdicts": verdicts,
         "good": verdicts.count("verified"),
-        "changes": own_changes[:_LISTED],
+        "changes": own_changes[:_MAX_LISTED],
         "total": len(own_changes),
-        "is_current": points[-1]["run"] == len(found.runs) - 1,
+        "is_current": points[-1]["run"] == len(history.runs) - 1,
     }

@@ -23,19 +23,19 @@ from urdfkin.report.reading import moving_names
 from urdfkin.report.words import (
     VERDICTS,
     accuracy_words,
+    bound_ratio_of,
     check_name,
-    columns,
-    counted,
-    in_order,
-    percent,
-    pinocchio,
+    checks_in_order,
+    format_count,
+    format_ratio,
+    format_units,
+    pinocchio_version,
+    quantities_by_heading,
     second_oracle_cells,
     second_oracle_heads,
     second_oracle_title,
     second_reader_words,
-    share_of,
     summary,
-    units,
     utc,
     verdict_counts,
     worst,
@@ -45,7 +45,7 @@ from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement, describe
 from urdfkin.verify.quantities import compared, not_compared
-from urdfkin.view.figure import installed
+from urdfkin.view.figure import has_matplotlib
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -60,7 +60,7 @@ _OPEN = 1
 _FAILURES_OPEN = 20
 #: If a report has more robots than this number, only robots that are not verified have histograms.
 #: The reason is computing time: the histograms of one robot take a second.
-_DRAWN = 100
+_MAX_DRAWN = 100
 #: Maximum number of characters of details in one page; with more, each robot has a separate file.
 MOST = 5_000_000
 
@@ -78,12 +78,12 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
-    environment.filters["counted"] = counted
+    environment.filters["format_count"] = format_count
     environment.globals["install_remedy"] = install_remedy
     return environment
 
 
-def rendered(template: str, **values: Any) -> str:
+def render_template(template: str, **values: Any) -> str:
     return environment().get_template(template).render(style=as_is(asset("report.css")), **values)
 
 
@@ -139,14 +139,14 @@ def _details(robot: dict[str, Any], document: Document) -> str:
 
 
 def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
-    quantities = columns(document["robots"])
-    return rendered(
+    quantities = quantities_by_heading(document["robots"])
+    return render_template(
         "report.html.j2",
         document=document,
         outcome=outcome_of(document),
         summary=summary(document),
-        when=when(document["started"]),
-        pinocchio=pinocchio(document),
+        when=format_date(document["started"]),
+        pinocchio=pinocchio_version(document),
         compared=compared(),
         not_compared=not_compared(),
         totals=_totals(document),
@@ -181,7 +181,7 @@ def _totals(document: Document) -> dict[str, Any]:
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
         "worst": worst_cell(checks),
-        "share": percent(worst(map(share_of, robots))) if checks else "",
+        "share": format_ratio(worst(map(bound_ratio_of, robots))) if checks else "",
     }
 
 
@@ -196,9 +196,9 @@ def _model_verdict(document: Document) -> dict[str, Any]:
         for counts, bad in zip(found, unread, strict=True)
     ]
     worst_word = next((word for word in severities if word in worst_of_file), "")
-    affected, files = worst_of_file.count(worst_word), counted(len(found), "file")
+    affected, files = worst_of_file.count(worst_word), format_count(len(found), "file")
     total = sum(found, Counter[str]())
-    words = ", ".join(counted(total[word], word) for word in severities if total[word])
+    words = ", ".join(format_count(total[word], word) for word in severities if total[word])
     if not found:
         colour, title = "warn", "No model was read"
     elif any(unread):
@@ -234,8 +234,8 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
                 "tables": {kind: pages.chain_rows(chain, kind) for kind in ("standard", "modified")},
                 "agrees": chain_disagreement(chain) is None,
                 "metres": f"{chain['metres'] or 0.0:.2g}",
-                "worst": units(chain["worst"]),
-                "share": percent(chain["share_of_bound"]),
+                "worst": format_units(chain["worst"]),
+                "share": format_ratio(chain["bound_ratio"]),
             }
             for chain in robot["chains"]
         ],
@@ -247,12 +247,12 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
         "second_oracle_heads": second_oracle_heads(title) if title else [],
         "second_oracle_rows": [
             [check_name(check), *second_oracle_cells([check], title)]
-            for check in in_order(robot)
+            for check in checks_in_order(robot)
             if title and "second_oracle" in check
         ],
         "accuracy": pages.accuracy_rows(robot["accuracy"]) if robot["accuracy"] else [],
         "accuracy_words": accuracy_words(robot["accuracy"]) if robot["accuracy"] else "",
-        "many": installed(),
+        "many": has_matplotlib(),
         "heat_heads": heads,
         "heat": heat,
         "plot": as_is(_plot(robot, index, document)),
@@ -260,12 +260,12 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
 
 
 def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
-    if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
+    if not has_matplotlib() or (len(document["robots"]) > _MAX_DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
-def when(started: str) -> str:
+def format_date(started: str) -> str:
     """Format an ISO date and time, converted to UTC; return other texts unchanged."""
     moment = utc(started)
     return f"{moment.day} {moment:%B %Y, %H:%M} UTC" if moment else started
@@ -283,7 +283,7 @@ class NotebookView:
 
     def page(self) -> str:
         data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
-        return rendered(
+        return render_template(
             "cell.html.j2",
             data=data,
             robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},

@@ -12,12 +12,12 @@ from xml.etree import ElementTree as ET
 
 from urdfkin.report.words import (
     check_name,
-    in_order,
-    percent,
+    checks_in_order,
+    format_ratio,
+    format_units,
     second_oracle_cells,
     second_oracle_heads,
     second_oracle_title,
-    units,
 )
 from urdfkin.validation.document import Case, Document, ReportedCheck, ReportedRobot, outcome_of
 
@@ -34,7 +34,7 @@ def as_junit(document: Document) -> bytes:
     """Return JUnit XML with a suite for each robot, and a case for each quantity and reference frame."""
     suites = [_suite(robot, document) for robot in document["robots"]]
     robots = document["robots"]
-    if document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots)):
+    if document["interrupted"] or not robots or len(robots) != document.get("robots_requested", len(robots)):
         suites.insert(0, _whole_run(document))
     counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
     root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)
@@ -66,7 +66,7 @@ def _function_case(check: FunctionCheck) -> ET.Element:
     title = text.partition("\n")[0]
     name = f"{check.quantity} by {check.function}"
     case = ET.Element("testcase", {"name": _clean(name), "classname": f"urdfkin.{_clean(check.robot)}"})
-    if check.agrees and check.oracle_share is not None:
+    if check.agrees and check.oracle_bound_ratio is not None:
         ET.SubElement(case, "system-out").text = _clean(text)
     else:
         kind = "not verified" if check.agrees else "disagreement"
@@ -79,7 +79,7 @@ _COUNTS = ("tests", "failures", "errors")
 
 def _suite(robot: ReportedRobot, document: Document) -> ET.Element:
     name = _clean(robot["source"])
-    cases = [*(_case(check, robot) for check in in_order(robot)), _verdict(robot)]
+    cases = [*(_case(check, robot) for check in checks_in_order(robot)), _verdict(robot)]
     facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
     return _suite_element(name, cases, facts | document["versions"], robot["seconds"], document)
 
@@ -121,7 +121,7 @@ def _case(check: ReportedCheck, robot: ReportedRobot) -> ET.Element:
     if check["failed"]:
         message = (
             f"{check['failed']:,} of {check['results']:,} results outside their bound,"
-            f" worst {units(check['worst'])} eps*scale"
+            f" worst {format_units(check['worst'])} eps*scale"
         )
         ET.SubElement(case, "failure", {"type": "disagreement", "message": message}).text = text
     else:
@@ -149,9 +149,9 @@ def _text(check: ReportedCheck, robot: ReportedRobot) -> str:
         f"{check_name(check)} of {robot['source']}",
         f"results compared: {check['results']:,}",
         f"outside their bound: {check['failed']:,}",
-        f"disagreement in eps*scale: median {units(check['median'])}, 99th percentile {units(check['p99'])},"
-        f" worst {units(check['worst'])}",
-        f"largest disagreement relative to its bound: {percent(check['share_of_bound'])}",
+        f"disagreement in eps*scale: median {format_units(check['median'])},"
+        f" 99th percentile {format_units(check['p99'])}, worst {format_units(check['worst'])}",
+        f"largest disagreement relative to its bound: {format_ratio(check['bound_ratio'])}",
     ]
     if tightest is not None and widest is not None:
         lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")

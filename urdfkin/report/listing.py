@@ -42,9 +42,9 @@ def print_table(out: Console, table: Table) -> None:
         if cell_len(cells[0]) > widths[0]:
             out.print(cells[0], soft_wrap=True, style=style)
             cells = ["", *cells[1:]]
-        out.print(gap.join(map(padded, range(len(cells)), cells)).rstrip(), soft_wrap=True, style=style)
+        out.print(gap.join(map(pad, range(len(cells)), cells)).rstrip(), soft_wrap=True, style=style)
 
-    def padded(i: int, cell: str) -> str:
+    def pad(i: int, cell: str) -> str:
         blanks = " " * (widths[i] - cell_len(cell))
         return cell + blanks if table.is_left(i) else blanks + cell
 

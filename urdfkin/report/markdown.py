@@ -10,16 +10,16 @@ from urdfkin.errors.escape import markdown_code, printable
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.words import (
     VERDICTS,
+    bound_ratio_cell,
     check_name,
-    columns,
-    counted,
+    format_count,
+    format_units,
+    quantities_by_heading,
     second_oracle_heads,
     second_oracle_rows,
     second_oracle_title,
-    share_cell,
     summary,
-    units,
-    worst_of,
+    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 
@@ -49,7 +49,7 @@ def as_markdown(document: Document) -> str:
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",
         "",
-        fenced(shortened(document["command"] or "", 2000)),
+        fence_code(shorten(document["command"] or "", 2000)),
         "",
     ]
     robots = sorted(document["robots"], key=lambda robot: VERDICTS.index(robot["verdict"]))
@@ -72,7 +72,7 @@ def _cross_check_table(robots: list[ReportedRobot]) -> list[str]:
 
 
 def _body(robots: list[ReportedRobot], room: int) -> list[str]:
-    quantities = columns(robots)
+    quantities = quantities_by_heading(robots)
     heads = ["robot", "joints", "frames", "results", *map(text, quantities), "of bound", "verdict"]
     lines = table_lines(heads, left=(0, len(heads) - 1))
     parts = [(row_line(_cells(robot, list(quantities.values()))), _details(robot)) for robot in robots]
@@ -83,7 +83,7 @@ def _body(robots: list[ReportedRobot], room: int) -> list[str]:
         good = sum(robot["verdict"] == "verified" for robot in rest)
         tails += [
             "",
-            f"{counted(len(rest), 'further robot')} left out, because the comment is full; {good} of"
+            f"{format_count(len(rest), 'further robot')} left out, because the comment is full; {good} of"
             " them verified.",
         ]
     return [*lines, *(row for row, _ in parts[:shown]), *tails]
@@ -92,12 +92,12 @@ def _body(robots: list[ReportedRobot], room: int) -> list[str]:
 def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
     return [
-        markdown_code(shortened(robot["source"], 60)),
+        markdown_code(shorten(robot["source"], 60)),
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
-        *(worst_of(robot, names) for names in quantities),
-        share_cell(robot),
+        *(worst_cell_of_quantities(robot, names) for names in quantities),
+        bound_ratio_cell(robot),
         f"{_MARKS[verdict]} {verdict}",
     ]
 
@@ -105,16 +105,16 @@ def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]
 def _details(robot: ReportedRobot) -> list[str]:
     lines: list[str] = []
     if robot["reason"]:
-        lines += ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
+        lines += ["", f"**{markdown_code(robot['source'])}**: {text(shorten(robot['reason'], 600))}"]
     failed = [check for check in robot["checks"] if check["failed"]]
     for check in failed[:_SHOWN]:
         lines += [
             "",
             f"**{markdown_code(robot['source'])}**, {text(check_name(check))}: {check['failed']:,} of"
-            f" {check['results']:,} outside their bound, worst {units(check['worst'])} eps·scale",
+            f" {check['results']:,} outside their bound, worst {format_units(check['worst'])} eps·scale",
         ]
         if check["worst_case"] is not None:
-            lines += ["", fenced(shortened(check["worst_case"]["replay"], 4000))]
+            lines += ["", fence_code(shorten(check["worst_case"]["replay"], 4000))]
     if len(failed) > _SHOWN:
         lines += ["", f"... and {len(failed) - _SHOWN} more quantities of {markdown_code(robot['source'])}"]
     return lines
@@ -140,7 +140,7 @@ def count_within(texts: Sequence[str], room: int) -> int:
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 
-def fenced(code: str) -> str:
+def fence_code(code: str) -> str:
     """Return a code block with a fence longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
@@ -148,5 +148,5 @@ def fenced(code: str) -> str:
     return f"{fence}sh\n{lines}\n{fence}"
 
 
-def shortened(words: str, length: int) -> str:
+def shorten(words: str, length: int) -> str:
     return words if len(words) <= length else words[: length - 4] + " ..."

@@ -11,20 +11,20 @@ from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.configuration import format_range
 from urdfkin.model.summary import format_axis
 from urdfkin.report.words import (
-    column,
-    columns,
-    counted,
+    bound_ratio_cell,
+    bound_ratio_of,
+    checks_in_order,
+    checks_of_quantities,
     error_cells,
-    in_order,
+    format_count,
+    format_ratio,
+    format_units,
     more_accurate,
-    percent,
+    quantities_by_heading,
     quantity_name,
-    share_cell,
-    share_of,
-    units,
     worst,
     worst_cell,
-    worst_of,
+    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import (
     Chain,
@@ -52,7 +52,7 @@ class HeatCell:
 
 def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
     checks = robot["checks"]
-    largest, share = worst(check["worst"] for check in checks), share_of(robot)
+    largest, ratio = worst(check["worst"] for check in checks), bound_ratio_of(robot)
     return {
         "source": robot["source"],
         "verdict": robot["verdict"],
@@ -60,13 +60,15 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
         "frames": len(robot["frames"]),
         "results": robot["results"],
         "failed": robot["failed"],
-        "quantities": [(worst_of(robot, names), _key(robot, names)) for names in quantities_of],
+        "quantities": [
+            (worst_cell_of_quantities(robot, names), _key(robot, names)) for names in quantities_of
+        ],
         "worst": worst_cell(checks),
         "worst_key": _sortable(largest) if checks else -1.0,
-        "share": share_cell(robot),
-        "share_key": _sortable(share) if checks else -1.0,
+        "share": bound_ratio_cell(robot),
+        "share_key": _sortable(ratio) if checks else -1.0,
         "findings": ", ".join(
-            counted(count, word) for word in ("error", "warning") if (count := _findings(robot, word))
+            format_count(count, word) for word in ("error", "warning") if (count := _findings(robot, word))
         ),
         "findings_key": 1e6 * _findings(robot, "error") + _findings(robot, "warning"),
         "seconds": robot["seconds"],
@@ -86,7 +88,7 @@ def _findings(robot: ReportedRobot, severity: str) -> int:
 
 
 def _key(robot: ReportedRobot, names: Sequence[str]) -> float:
-    checks = column(robot, names)
+    checks = checks_of_quantities(robot, names)
     return _sortable(worst(check["worst"] for check in checks)) if checks else -1.0
 
 
@@ -104,22 +106,23 @@ def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
             "q": _coordinate(joint),
             "axis": format_axis(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
-            "kept": _remaining_range(joint),
+            "remaining_range": _remaining_range(joint),
         }
         for joint in model["joints"]
     ]
 
 
 def _remaining_range(joint: ReportedJoint) -> str:
-    kept = joint.get("kept")
-    if kept is None:
+    remaining = joint.get("remaining_range")
+    if remaining is None:
         return ""
-    if kept["lower"] is None or kept["upper"] is None:
-        names = ", ".join(kept["by"])
+    if remaining["lower"] is None or remaining["upper"] is None:
+        names = ", ".join(remaining["by"])
         return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
-    ends = f"{format_range((kept['lower'], kept['upper']))} {unit}"
-    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({', '.join(kept['by'])})."
+    ends = f"{format_range((remaining['lower'], remaining['upper']))} {unit}"
+    mimics = ", ".join(remaining["by"])
+    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({mimics})."
 
 
 def _coordinate(joint: ReportedJoint) -> str:
@@ -148,7 +151,7 @@ def heat_map(
     robot: ReportedRobot, model: ReportedModel
 ) -> tuple[list[str], list[tuple[str, list[HeatCell]]]]:
     """Return the column heads, and (name, cells) for each moving joint."""
-    quantities_of = columns([robot])
+    quantities_of = quantities_by_heading([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
     own = _columns(model)
@@ -159,7 +162,9 @@ def heat_map(
             "joints": [moving[joint]],
             "columns": own.get(joint, []),
         }
-        rows.append((joint, [_cell(column(robot, names), where) for names in quantities_of.values()]))
+        rows.append(
+            (joint, [_cell(checks_of_quantities(robot, names), where) for names in quantities_of.values()])
+        )
     return list(quantities_of), rows
 
 
@@ -181,17 +186,17 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
     largest = worst(found)
     if largest is None:
         return HeatCell("not finite", len(HEAT_STEPS) + 1)
-    share = max(_share(check, i) for check in checks for i in where[check["subjects"]])
-    return HeatCell(units(largest), sum(share > edge for edge in HEAT_STEPS) + (share > 0.0))
+    ratio = max(_bound_ratio(check, i) for check in checks for i in where[check["subjects"]])
+    return HeatCell(format_units(largest), sum(ratio > edge for edge in HEAT_STEPS) + (ratio > 0.0))
 
 
-def _share(check: ReportedCheck, subject: int) -> float:
+def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     """Return an upper limit of (disagreement / error bound) for one frame, joint or column.
 
     The document has no error bound for a single frame, joint or column. This function therefore divides the
     disagreement by the check's smallest error bound. The result never exceeds the check's largest ratio.
     """
-    value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
+    value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.
     if not value:
         return math.inf if value is None else 0.0
@@ -251,24 +256,22 @@ def check_rows(robot: ReportedRobot) -> list[dict[str, Any]]:
             "reference": check["reference"] or "",
             "results": check["results"],
             "failed": check["failed"],
-            "median": units(check["median"]),
-            "p99": units(check["p99"]),
-            "worst": units(check["worst"]),
-            "share": percent(check["share_of_bound"]),
-            "width": 100.0
-            if check["share_of_bound"] is None
-            else min(100.0, 100.0 * check["share_of_bound"]),
+            "median": format_units(check["median"]),
+            "p99": format_units(check["p99"]),
+            "worst": format_units(check["worst"]),
+            "share": format_ratio(check["bound_ratio"]),
+            "width": 100.0 if check["bound_ratio"] is None else min(100.0, 100.0 * check["bound_ratio"]),
             "case": check["worst_case"],
             "where": "" if check["worst_case"] is None else check["worst_case"]["frame"],
         }
-        for check in in_order(robot)
+        for check in checks_in_order(robot)
     ]
 
 
 def failures(robot: ReportedRobot) -> list[dict[str, Any]]:
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
-        key=lambda check: -_sortable(check["share_of_bound"]),
+        key=lambda check: -_sortable(check["bound_ratio"]),
     )
     rows = {(row["quantity"], row["reference"]): row for row in check_rows(robot)}
     return [rows[quantity_name(check["quantity"]), check["reference"] or ""] for check in failing]

@@ -15,7 +15,7 @@ from pathlib import Path
 from urdfkin.errors import InputError
 from urdfkin.report.words import check_name, worst
 from urdfkin.system.documents import read_json
-from urdfkin.validation.chunk import SPECIAL
+from urdfkin.validation.chunk import SPECIAL_SAMPLES
 from urdfkin.validation.document import (
     VALIDATION,
     Chain,
@@ -132,8 +132,8 @@ def contradictions(document: Document) -> Iterator[str]:
     if not edges or any(a >= b for a, b in pairwise(edges)):
         yield "`histogram_edges` are not in ascending order"
         return
-    if document["asked"] < len(robots):
-        yield f"`asked` is {document['asked']}, but {len(robots)} robots have a report"
+    if document["robots_requested"] < len(robots):
+        yield f"`robots_requested` is {document['robots_requested']}, but {len(robots)} robots have a report"
     found = outcome_of(document)
     if document["verdict"] != found.verdict:
         yield f"`verdict` is {document['verdict']}, but {found.reason or 'every robot was verified'}"
@@ -163,7 +163,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
     for name, (value, expected) in sums.items():
         if value != expected:
             yield f"`{name}` is not {expected}, the sum of the robot's checks"
-    yield from _verdict(robot, document["samples"] + SPECIAL)
+    yield from _verdict(robot, document["samples"] + SPECIAL_SAMPLES)
     names = [(check["quantity"], check["reference"]) for check in robot["checks"]]
     if len(set(names)) != len(names):
         yield "`checks`: a quantity occurs twice"
@@ -178,7 +178,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
         for contradiction in _check(check, own, robot, document):
             yield f"{check_name(check)}: {contradiction}"
     for chain in robot["chains"]:
-        figures = chain["metres"], chain["worst"], chain["share_of_bound"]
+        figures = chain["metres"], chain["worst"], chain["bound_ratio"]
         if not chain["samples"] and any(figure is not None for figure in figures):
             ends = f"{chain['base']} to {chain['tip']}"
             yield f"tables from {ends}: `samples` is 0, but the tables have disagreements"
@@ -247,28 +247,28 @@ def _check(
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
         if not math.isclose(_as_number(stated), computed, rel_tol=_TOLERANCE):
             yield f"`{name}` is {stated}, but the histogram gives {computed:g}"
-    yield from _share(check)
-    yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
+    yield from _check_bound_ratio(check)
+    yield from _case(check, subjects, robot, document["samples"] + SPECIAL_SAMPLES)
 
 
-def _share(check: ReportedCheck) -> Iterator[str]:
-    """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
+def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
+    """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
 
     The ratio must be at least `worst` divided by the largest bound. The ratio must be at most `worst` divided
     by the smallest bound.
     """
-    share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
+    ratio, largest = _as_number(check["bound_ratio"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
-    if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
-        yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
+    if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
+        yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
         # Without a comparison, there is no bound.
-        if share or largest or check["worst_case"]:
+        if ratio or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but the check has a disagreement"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
-    if not (ends[0] * (1.0 - _TOLERANCE) <= share <= ends[1] * (1.0 + _TOLERANCE)):
-        yield f"`share_of_bound` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
+    if not (ends[0] * (1.0 - _TOLERANCE) <= ratio <= ends[1] * (1.0 + _TOLERANCE)):
+        yield f"`bound_ratio` is {ratio:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
 
 
 def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, samples: int) -> Iterator[str]:
@@ -290,10 +290,10 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
             f"`worst_case` has {case['disagreement']} at {case['frame']}, but the worst disagreement at"
             f" {case['frame']} is {of_frame}"
         )
-    share, units = _as_number(check["share_of_bound"]), _as_number(case["disagreement"])
-    low, high = (share * (bound or 0.0) for bound in check["bound"])
+    ratio, units = _as_number(check["bound_ratio"]), _as_number(case["disagreement"])
+    low, high = (ratio * (bound or 0.0) for bound in check["bound"])
     if math.isfinite(units) and not low * (1 - _TOLERANCE) <= units <= high * (1 + _TOLERANCE):
-        yield f"`worst_case`: the disagreement {units:g} is not {share:g} times a bound"
+        yield f"`worst_case`: the disagreement {units:g} is not {ratio:g} times a bound"
     if model is not None and (len(case["q"]), len(case["v"]), len(case["a"])) != (
         model["nq"],
         model["nv"],
@@ -312,16 +312,16 @@ _SHOWN = 3
 
 
 def read_document(path: Path) -> Document:
-    return checked(read_json(path), str(path))
+    return check_document(read_json(path), str(path))
 
 
-def stored_document(folder: Path) -> Document:
-    from urdfkin.validation.campaign import stored
+def read_stored_document(folder: Path) -> Document:
+    from urdfkin.validation.campaign import read_stored_report
 
-    return checked(stored(folder).as_dict(), str(folder))
+    return check_document(read_stored_report(folder).as_dict(), str(folder))
 
 
-def checked(data: object, where: str) -> Document:
+def check_document(data: object, where: str) -> Document:
     document = VALIDATION.checked(data, where)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""

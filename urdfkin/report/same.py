@@ -20,7 +20,7 @@ from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.report.markdown import table_lines
-from urdfkin.report.words import counted
+from urdfkin.report.words import format_count
 from urdfkin.robot import Robot
 
 #: Number of lines for each kind of difference that are shown without --all.
@@ -39,49 +39,51 @@ FACTOR = 1.001
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
-def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
-    limits = sum(one.what == "limits" for one in found.remarks)
-    besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
-    if found.unlimited:
+def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
+    limits = sum(one.what == "limits" for one in sameness.remarks)
+    besides = f"; limits of {format_count(limits, 'joint')} differ" if limits else ""
+    if sameness.unlimited:
         besides += f"; this result holds if {TRAVEL_CONDITION}"
     if question.within is not None:
-        return _within(found, question.within) + besides
+        return _within(sameness, question.within) + besides
     off = "the distance of the frames has no bound"
-    if math.isfinite(max(found.written)):
-        off = f"in every configuration no frame is off by more than {_both(*found.written)}"
-    if found.up_to_single:
+    if math.isfinite(max(sameness.written)):
+        off = f"in every configuration no frame is off by more than {_both(*sameness.written)}"
+    if sameness.up_to_single:
         cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
-    if found.within_single and found.single is not None:
-        single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
-        return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}, but {found.unexplained[0]}{besides}"
-    if found.verdict is Verdict.DIFFERS:
-        by = _by(found.frames, found.rounding)
-        if found.frames and not by:
+    if sameness.within_single and sameness.single is not None:
+        single = f"rounding to single precision can move a frame by up to {_both(*sameness.single)}"
+        return f"DIFFERS WITHIN SINGLE PRECISION: {off}; {single}, but {sameness.unexplained[0]}{besides}"
+    if sameness.verdict is Verdict.DIFFERS:
+        by = _by(sameness.frames, sameness.rounding)
+        if sameness.frames and not by:
             by = ", although the common frames differ only by rounding errors"
-        single = "" if found.single is None else f"; single precision explains up to {_both(*found.single)}"
-        single += f", but {found.unexplained[0]}" if single and found.unexplained else ""
-        return f"DIFFERS{by}; first difference: {found.differences[0].words}{single}{besides}"
-    metres, radians = found.rounding
+        single = (
+            "" if sameness.single is None else f"; single precision explains up to {_both(*sameness.single)}"
+        )
+        single += f", but {sameness.unexplained[0]}" if single and sameness.unexplained else ""
+        return f"DIFFERS{by}; first difference: {sameness.differences[0].words}{single}{besides}"
+    metres, radians = sameness.rounding
     off = f"no frame is off by more than rounding, {length(metres)} and {angle(radians)}"
-    if found.verdict is Verdict.SAME:
+    if sameness.verdict is Verdict.SAME:
         return f"SAME: in every configuration {off}{besides}"
-    written = f"; {as_written(found)}" if as_written(found) else ""
-    return f"EQUIVALENT up to {', '.join(found.up_to)}: in every configuration {off}{written}{besides}"
+    written = f"; {describe_as_written(sameness)}" if describe_as_written(sameness) else ""
+    return f"EQUIVALENT up to {', '.join(sameness.up_to)}: in every configuration {off}{written}{besides}"
 
 
-def _within(found: Sameness, most: float) -> str:
+def _within(sameness: Sameness, most: float) -> str:
     limit = f"WITHIN {most:g} m and rad without changes of B: "
-    if found.within(most):
-        return f"{limit}no frame is ever off by more than {_both(*found.written)}"
-    if (beyond := next((one for one in found.differences if one.what not in BOUNDED), None)) is not None:
+    if sameness.within(most):
+        return f"{limit}no frame is ever off by more than {_both(*sameness.written)}"
+    if (beyond := next((one for one in sameness.differences if one.what not in BOUNDED), None)) is not None:
         return f"NOT {limit}{beyond.words}"
-    frames = (found.as_written,) if found.as_written is not None else found.frames
+    frames = (sameness.as_written,) if sameness.as_written is not None else sameness.frames
     far = [one for one in frames if one.lower > most or one.radians_seen > most]
     if far:
         worst = max(far, key=lambda one: (one.lower, one.radians_seen))
-        return f"NOT {limit}{worst.frame} is {_off(worst, found.rounding)} off"
-    return f"NOT {limit}the proven bound is {_both(*found.written)}"
+        return f"NOT {limit}{worst.frame} is {_off(worst, sameness.rounding)} off"
+    return f"NOT {limit}the proven bound is {_both(*sameness.written)}"
 
 
 def _both(metres: float, radians: float) -> str:
@@ -116,45 +118,49 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
     return " and ".join(parts)
 
 
-def far_frames(found: Sameness) -> list[Interval]:
-    metres, radians = found.rounding
-    far = [frame for frame in found.frames if frame.upper > metres or frame.radians > radians]
+def far_frames(sameness: Sameness) -> list[Interval]:
+    metres, radians = sameness.rounding
+    far = [frame for frame in sameness.frames if frame.upper > metres or frame.radians > radians]
     return sorted(far, key=lambda frame: (-frame.upper, -frame.lower))
 
 
-def farthest(found: Sameness) -> str:
+def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
     The table has the distances after the changes of B. The verdict "same up to single precision" is about the
     unchanged models. Therefore, if the models have this verdict, the heading lists the changes of B.
     """
-    changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
+    changed = (
+        f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
+    )
     return f"Largest distance over all configurations within limits{changed}"
 
 
-def rows(frames: Sequence[Interval]) -> list[list[str]]:
+def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
     return [[frame.frame, length(frame.lower), length(frame.upper), angle(frame.radians)] for frame in frames]
 
 
-def as_written(found: Sameness) -> str:
+def describe_as_written(sameness: Sameness) -> str:
     """Describe the largest distance between matching frames of A and the unchanged B.
 
     The text is empty if B needs no changes, or if rounding errors explain the distance.
     """
-    frame = found.as_written
-    off = "" if frame is None else _off(frame, found.rounding)
+    frame = sameness.as_written
+    off = "" if frame is None else _off(frame, sameness.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
 
 
-def where(found: Sameness, frame: Interval) -> str:
+def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Describe the configuration at which a lower bound is attained, with units.
 
     The text has the nonzero coordinates of A. A joint of B that matches no independent joint of A has its own
     coordinate; the text also has these coordinates, if they are not 0.
     """
-    a, b = found.trees
+    a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
-    driven = {one.b for one in found.joints if (own := a.joints[a.joint_index(one.a)]).nv and not own.mimic}
+    driven = {
+        one.b for one in sameness.joints if (own := a.joints[a.joint_index(one.a)]).nv and not own.mimic
+    }
     alone = {b.q_index[i] for i, joint in enumerate(b.joints) if joint.nv == 1 and joint.name not in driven}
     of_b = zip(coordinate_names(b), units(b, "q"), frame.q_b, strict=False)
     names += [(f"{name} of B", unit, value) for k, (name, unit, value) in enumerate(of_b) if k in alone]
@@ -162,62 +168,66 @@ def where(found: Sameness, frame: Interval) -> str:
     return ", ".join(some) or "the zero configuration"
 
 
-def renamed(found: Sameness) -> list[str]:
-    pairs = [one for one in found.joints if one.a != one.b]
+def describe_renames(sameness: Sameness) -> list[str]:
+    pairs = [one for one in sameness.joints if one.a != one.b]
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
         "joints of B have a different order, without effect on the motion; joints are compared in the order "
         + ", ".join(names)
-        for names in found.orders
+        for names in sameness.orders
     ]
-    if (guessed or found.orders) and not found:
+    if (guessed or sameness.orders) and not sameness:
         joints = [GUESSED, *joints]
-    return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
+    return joints + [f"link {name_a} is {name_b}" for name_a, name_b in sameness.links if name_a != name_b]
 
 
-def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
+def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
     """Return the answer with reasons; without `all_`, at most `SHOWN` lines of each kind."""
-    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
-    head = headline(found, question)
-    parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
+    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(sameness), strict=True)]
+    head = headline(sameness, question)
+    parts.append(Strong(head, "bold green" if sameness.holds(question) else "bold red"))
     some = None if all_ else SHOWN
-    after, words = _reasons(found, all_=all_)
+    after, words = _reasons(sameness, all_=all_)
     parts += _lines("changes of B", after, some)
-    if after and as_written(found) not in head:
-        parts += _lines("", [as_written(found)], some)
+    if after and describe_as_written(sameness) not in head:
+        parts += _lines("", [describe_as_written(sameness)], some)
     parts += _lines("differences", words[1:] if words and words[0] in head else words, some)
-    frames = far_frames(found)
+    frames = far_frames(sameness)
     if frames:
-        parts.append(f"{farthest(found).lower()}:")
-        parts += [Table(HEADS, rows(frames[:some])), *_rest(len(frames), some), *_worst_case(found, frames)]
-    parts += _lines(NARROWED, found.narrowed, some)
-    parts += _lines("different names", renamed(found), some)
-    parts += _lines("differences without effect on motion", [one.words for one in found.remarks], some)
-    return TextDocument("", [*parts, str(found.checked)])
+        parts.append(f"{frames_heading(sameness).lower()}:")
+        parts += [
+            Table(HEADS, frame_rows(frames[:some])),
+            *_rest(len(frames), some),
+            *_worst_case(sameness, frames),
+        ]
+    parts += _lines(NARROWED, sameness.narrowed, some)
+    parts += _lines("different names", describe_renames(sameness), some)
+    parts += _lines("differences without effect on motion", [one.words for one in sameness.remarks], some)
+    return TextDocument("", [*parts, str(sameness.checked)])
 
 
-def _names(found: Sameness) -> list[str]:
-    return [f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True)]
+def _names(sameness: Sameness) -> list[str]:
+    return [f"{name} ({source})" for name, source in zip(sameness.names, sameness.sources, strict=True)]
 
 
-def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
-    off = attained(frames[0])
-    return [f"{frames[0].frame} is {off} off at: {where(found, frames[0])}"] if off else []
+def _worst_case(sameness: Sameness, frames: Sequence[Interval]) -> list[str]:
+    off = distance_text(frames[0])
+    return [f"{frames[0].frame} is {off} off at: {configuration_text(sameness, frames[0])}"] if off else []
 
 
-def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
-    if found.up_to_single and not all_:
+def _reasons(sameness: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
+    if sameness.up_to_single and not all_:
         return (), []
-    return found.after, [one.words for one in found.differences]
+    return sameness.after, [one.words for one in sameness.differences]
 
 
 PAIRS = ("A", "B", "verdict", "distance bound, as given", "single precision")
 
 
-def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
+def _pair_rows(pairs: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
     rows = list[tuple[str, ...]]()
-    for one in found:
+    for one in pairs:
         words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value
         if one.within_single:
             words = "differs within single precision"
@@ -230,39 +240,39 @@ def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[
     return rows
 
 
-def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> TextDocument:
-    rows = _pair_rows(found, question)
+def pairs_document(pairs: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> TextDocument:
+    rows = _pair_rows(pairs, question)
     different = [
         f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
-        for one in found
+        for one in pairs
         if not one.holds(question)
     ]
     return TextDocument("", [Table(PAIRS, rows, left=3), *different])
 
 
-def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
-    rows = (map(markdown_text, row) for row in _pair_rows(found, question))
+def pairs_markdown(pairs: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
+    rows = (map(markdown_text, row) for row in _pair_rows(pairs, question))
     return "\n".join([*table_lines(PAIRS, rows), ""])
 
 
-def as_document(found: Sameness) -> TextDocument:
-    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
-    after, words = _reasons(found)
+def as_document(sameness: Sameness) -> TextDocument:
+    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(sameness), strict=True)]
+    after, words = _reasons(sameness)
     for head, lines in (
-        ("Change of B", [*after, as_written(found)] if after else []),
+        ("Change of B", [*after, describe_as_written(sameness)] if after else []),
         ("Difference", words),
-        ("Without effect on motion", [one.words for one in found.remarks]),
+        ("Without effect on motion", [one.words for one in sameness.remarks]),
     ):
         parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
         parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
-    if frames := far_frames(found):
-        parts += [f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN]))]
+    if frames := far_frames(sameness):
+        parts += [f"{frames_heading(sameness)}:", Table(HEADS, frame_rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
-        parts += _worst_case(found, frames)
-    return TextDocument(headline(found), [*parts, str(found.checked)])
+        parts += _worst_case(sameness, frames)
+    return TextDocument(headline(sameness), [*parts, str(sameness.checked)])
 
 
-def attained(frame: Interval) -> str:
+def distance_text(frame: Interval) -> str:
     """Describe the distance of two frames at the worst configuration, unless the frames coincide."""
     if frame.lower:
         return length(frame.lower)
@@ -280,78 +290,80 @@ def _rest(n: int, some: int | None) -> list[str]:
     return [f"  ... and {n - some} more: --all shows them"] if some is not None and n > some else []
 
 
-def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
-    mark = "✅" if found.holds(question) else "❌"
+def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
+    mark = "✅" if sameness.holds(question) else "❌"
     text = markdown_text
-    names = " and ".join(map(text, _names(found)))
-    lines = [f"## {mark} {text(headline(found, question))}", "", names, ""]
-    after, reasons = _reasons(found)
+    names = " and ".join(map(text, _names(sameness)))
+    lines = [f"## {mark} {text(headline(sameness, question))}", "", names, ""]
+    after, reasons = _reasons(sameness)
     for head, words in (
-        ("Changes of B", [*after, as_written(found)] if after else []),
+        ("Changes of B", [*after, describe_as_written(sameness)] if after else []),
         ("Differences", reasons),
-        (NARROWED.capitalize(), found.narrowed),
-        ("Different names", renamed(found)),
-        ("Differences without effect on motion", [one.words for one in found.remarks]),
+        (NARROWED.capitalize(), sameness.narrowed),
+        ("Different names", describe_renames(sameness)),
+        ("Differences without effect on motion", [one.words for one in sameness.remarks]),
     ):
         if words:
             lines += [f"**{head}**", ""]
             lines += [f"- {text(word)}" for word in words[: 4 * SHOWN]]
-            lines += [f"- {counted(len(words) - 4 * SHOWN, 'more line')}"] if len(words) > 4 * SHOWN else []
+            lines += (
+                [f"- {format_count(len(words) - 4 * SHOWN, 'more line')}"] if len(words) > 4 * SHOWN else []
+            )
             lines.append("")
-    frames = far_frames(found)
+    frames = far_frames(sameness)
     if frames:
-        cells = (map(text, row) for row in rows(frames[: 4 * SHOWN]))
-        lines += [f"{farthest(found)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
-    return "\n".join([*lines, text(str(found.checked)), ""])
+        cells = (map(text, row) for row in frame_rows(frames[: 4 * SHOWN]))
+        lines += [f"{frames_heading(sameness)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
+    return "\n".join([*lines, text(str(sameness.checked)), ""])
 
 
 #: Half the side length of a picture (units of the SVG), and fraction of the picture that the robots fill.
 HALF, FILLED = 150.0, 0.9
 #: Maximum length of the scale bar, relative to the side length of a picture.
-SCALE = 0.3
+MAX_SCALE_BAR = 0.3
 #: Distance of the scale bar from the lower edge of a picture, in units of the SVG.
-FOOT = 6.0
+SCALE_BAR_MARGIN = 6.0
 #: Length of the axes in the close view, relative to the distance between the two frames.
-AXIS = 0.35
+AXIS_LENGTH = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
 
 def as_html(
-    found: Sameness,
+    sameness: Sameness,
     robots: tuple[Robot, Robot],
     question: SameQuestion = EQUIVALENT,
     options: Sequence[str] = (),
     started: datetime | None = None,
 ) -> str:
     """Return an HTML page with the answer; the template escapes all names."""
-    from urdfkin.report.html import rendered, when
+    from urdfkin.report.html import format_date, render_template
     from urdfkin.verify.oracles import versions
 
     moment = started or datetime.now(UTC)
-    frames = far_frames(found)
-    written = question.within is not None and found.as_written is not None
-    worst = found.as_written if written else frames[0] if frames and frames[0].q_a else None
-    return rendered(
+    frames = far_frames(sameness)
+    written = question.within is not None and sameness.as_written is not None
+    worst = sameness.as_written if written else frames[0] if frames and frames[0].q_a else None
+    return render_template(
         "same.html.j2",
-        found=found,
-        headline=headline(found, question),
-        good=found.holds(question),
-        narrowed=found.narrowed,
+        found=sameness,
+        headline=headline(sameness, question),
+        good=sameness.holds(question),
+        narrowed=sameness.narrowed,
         narrowed_head=NARROWED.capitalize(),
         started=moment.isoformat(timespec="seconds"),
-        when=when(moment.isoformat(timespec="seconds")),
+        when=format_date(moment.isoformat(timespec="seconds")),
         versions=versions(),
         command=command_of(robots, question, options),
         heads=HEADS,
-        farthest=farthest(found),
-        frames=rows(frames),
-        as_written=as_written(found),
-        renamed=renamed(found),
-        where=where(found, worst) if worst else "",
-        pictures=pictures(found, robots, worst, written=written),
-        title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
-        if worst and attained(worst)
+        farthest=frames_heading(sameness),
+        frames=frame_rows(frames),
+        as_written=describe_as_written(sameness),
+        renamed=describe_renames(sameness),
+        where=configuration_text(sameness, worst) if worst else "",
+        pictures=pictures(sameness, robots, worst, written=written),
+        title=f"Where {worst.frame} is {distance_text(worst)} off{' without changes of B' if written else ''}"
+        if worst and distance_text(worst)
         else "Both robots in the zero configuration",
     )
 
@@ -364,7 +376,7 @@ def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Seq
 
 
 def pictures(
-    found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
+    sameness: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
@@ -374,25 +386,32 @@ def pictures(
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
-    q_b = np.array(worst.q_b) if worst else found.to_b(a.neutral())
+    q_b = np.array(worst.q_b) if worst else sameness.to_b(a.neutral())
     T_a = a.placement(q_a, a.link_frames, verify=False)
     T_b = b.placement(q_b, b.link_frames, verify=False)
-    ours, theirs = Mechanism(a.tree), Mechanism(b.tree)
+    mechanism_a, mechanism_b = Mechanism(a.tree), Mechanism(b.tree)
     if written:
-        T_b = T_a[0] @ base_as_written(ours, theirs) @ inverse(T_b[0]) @ T_b
+        T_b = T_a[0] @ base_as_written(mechanism_a, mechanism_b) @ inverse(T_b[0]) @ T_b
     else:
-        i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
-        T_b = T_a[i] @ inverse(ours.zero_poses[i]) @ found.base @ theirs.zero_poses[j] @ inverse(T_b[j]) @ T_b
+        i, j = a.tree.link_index(sameness.base_links[0]), b.tree.link_index(sameness.base_links[1])
+        T_b = (
+            T_a[i]
+            @ inverse(mechanism_a.zero_poses[i])
+            @ sameness.base
+            @ mechanism_b.zero_poses[j]
+            @ inverse(T_b[j])
+            @ T_b
+        )
     bones = _bones(a, T_a), _bones(b, T_b)
-    drawn = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
+    drawings = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:
         at = T_a[a.tree.link_index(worst.frame)], T_b[b.tree.link_index(worst.frame_b)]
-        room = float(np.linalg.norm(at[0][:3, 3] - at[1][:3, 3]))
-        if room > 0.0:
-            axes = tuple(_axes(T, AXIS * room) for T in at)
+        distance = float(np.linalg.norm(at[0][:3, 3] - at[1][:3, 3]))
+        if distance > 0.0:
+            axes = tuple(_axes(T, AXIS_LENGTH * distance) for T in at)
             gap = np.stack((at[0][:3, 3], at[1][:3, 3]))[np.newaxis]
-            drawn.append(_draw(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
-    return drawn
+            drawings.append(_draw(f"{worst.frame}, close by", *VIEWS[0][1:], (axes[0], axes[1]), gap))
+    return drawings
 
 
 def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
@@ -413,14 +432,19 @@ def _draw(
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     # The first row is the direction in space that points to the right on the page. The second row is the
     # direction that points down on the page.
-    seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
-    flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
+    projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
+    flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
     scale = 2.0 * HALF * FILLED / max(float((high - low).max()), MIN_DIVISOR)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
-    ruler = round_length(2.0 * HALF * SCALE / scale)
-    bar = {"x": -HALF * FILLED, "y": HALF - FOOT, "width": round(ruler * scale, 1), "words": length(ruler)}
+    ruler = round_length(2.0 * HALF * MAX_SCALE_BAR / scale)
+    bar = {
+        "x": -HALF * FILLED,
+        "y": HALF - SCALE_BAR_MARGIN,
+        "width": round(ruler * scale, 1),
+        "words": length(ruler),
+    }
     return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF, "scale": bar}
 
 

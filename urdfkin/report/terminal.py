@@ -13,27 +13,27 @@ from urdfkin.errors.display import Table
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
     accuracy_words,
+    bound_ratio_cell,
     check_name,
-    columns,
-    counted,
+    checks_in_order,
+    checks_of_quantity,
     error_cells,
-    in_order,
+    format_count,
+    format_ratio,
+    format_units,
     more_accurate,
-    of_quantity,
-    percent,
-    pinocchio,
+    pinocchio_version,
     quantities,
+    quantities_by_heading,
     quantity_name,
     second_oracle_heads,
     second_oracle_rows,
     second_oracle_title,
     second_reader_words,
-    share_cell,
     summary,
-    units,
     worst,
     worst_cell,
-    worst_of,
+    worst_cell_of_quantities,
 )
 from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobot, outcome_of
 
@@ -52,7 +52,8 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     """
     robots = document["robots"]
     out.print(
-        f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale (rounding gives 1 to 10)",
+        f"worst disagreement with Pinocchio {pinocchio_version(document)}, in eps*scale"
+        " (rounding gives 1 to 10)",
         style="bold",
     )
     if len(robots) == 1 and robots[0]["checks"]:
@@ -83,10 +84,14 @@ def _counts(robot: ReportedRobot) -> list[str]:
 
 
 def _print_wide(robots: Sequence[ReportedRobot], out: Console) -> None:
-    quantities_of = columns(robots)
+    quantities_of = quantities_by_heading(robots)
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
     rows = [
-        [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
+        [
+            *_counts(robot),
+            *(worst_cell_of_quantities(robot, names) for names in quantities_of.values()),
+            robot["verdict"],
+        ]
         for robot in robots
     ]
     print_table(out, Table(heads, rows, left=(0, len(heads) - 1)))
@@ -98,7 +103,7 @@ def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
         [
             *_counts(robot),
             worst_cell(robot["checks"]),
-            share_cell(robot),
+            bound_ratio_cell(robot),
             robot["verdict"],
         ]
         for robot in robots
@@ -109,16 +114,16 @@ def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
 def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
     rows = []
     for name in quantities(robots):
-        checks = [check for robot in robots for check in of_quantity(robot, name)]
+        checks = [check for robot in robots for check in checks_of_quantity(robot, name)]
         largest = worst(check["worst"] for check in checks)
         where = next(
             robot["source"]
             for robot in robots
-            if any(check["worst"] == largest for check in of_quantity(robot, name))
+            if any(check["worst"] == largest for check in checks_of_quantity(robot, name))
         )
         results = f"{sum(check['results'] for check in checks):,}"
-        share = percent(worst(check["share_of_bound"] for check in checks))
-        rows.append([quantity_name(name), results, units(largest), share, where])
+        ratio = format_ratio(worst(check["bound_ratio"] for check in checks))
+        rows.append([quantity_name(name), results, format_units(largest), ratio, where])
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
@@ -135,12 +140,12 @@ def _print_checks(robot: ReportedRobot, out: Console) -> None:
             check_name(check),
             f"{check['results']:,}",
             f"{check['failed']:,}",
-            units(check["median"]),
-            units(check["p99"]),
-            units(check["worst"]),
-            percent(check["share_of_bound"]),
+            format_units(check["median"]),
+            format_units(check["p99"]),
+            format_units(check["worst"]),
+            format_ratio(check["bound_ratio"]),
         ]
-        for check in in_order(robot)
+        for check in checks_in_order(robot)
     ]
     out.print(robot["source"], style="bold")
     print_table(out, Table(heads, rows))
@@ -170,7 +175,7 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
     noted = [finding for finding in robot["findings"] if finding["severity"] != "note"]
     if noted and robot["checks"] and cases:
         out.print(
-            f"{robot['source']}: {counted(len(noted), 'warning')}, see: urdfkin check {robot['source']}"
+            f"{robot['source']}: {format_count(len(noted), 'warning')}, see: urdfkin check {robot['source']}"
         )
     reading = robot.get("second_reader")
     if cases and reading is not None and (reading["known"] or reading["unread"]):
@@ -188,7 +193,7 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
             continue
         out.print(
             f"{robot['source']}, {check_name(check)}: {check['failed']:,} of {check['results']:,} outside"
-            f" the bound, worst {units(check['worst'])} eps*scale,"
-            f" {percent(check['share_of_bound'])} of the bound"
+            f" the bound, worst {format_units(check['worst'])} eps*scale,"
+            f" {format_ratio(check['bound_ratio'])} of the bound"
         )
         out.print(f"  {case['replay']}", soft_wrap=True)

@@ -53,11 +53,11 @@ def second_reader_words(robot: ReportedRobot) -> str:
         return f"✗ {reading['by']} reads another robot: {'; '.join(reading['differences'])}{known}"
     return (
         f"{reading['by']} reads the same links, joints, origins, axes, limits and mimic rules"
-        f" ({counted(reading['joints'], 'joint')}){known}"
+        f" ({format_count(reading['joints'], 'joint')}){known}"
     )
 
 
-def units(value: Units, *, compared: bool = True) -> str:
+def format_units(value: Units, *, compared: bool = True) -> str:
     """Format a disagreement; None means infinity."""
     if not compared:
         return ""
@@ -66,14 +66,14 @@ def units(value: Units, *, compared: bool = True) -> str:
     return f"{value:.2f}" if value < 1000.0 else f"{value:.2g}"
 
 
-def percent(share: Units) -> str:
+def format_ratio(ratio: Units) -> str:
     """Format the ratio of a disagreement to its bound.
 
     A ratio below 10 is written as a percentage, another ratio as a factor.
     """
-    if share is None:
+    if ratio is None:
         return "inf"
-    return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
+    return f"{ratio:.1%}" if ratio < 10.0 else f"{ratio:.2g} x"
 
 
 def worst(values: Iterable[Units]) -> Units:
@@ -91,15 +91,15 @@ def quantities(robots: Sequence[ReportedRobot]) -> list[str]:
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
 
-def of_quantity(robot: ReportedRobot, quantity: str) -> list[ReportedCheck]:
+def checks_of_quantity(robot: ReportedRobot, quantity: str) -> list[ReportedCheck]:
     return [check for check in robot["checks"] if check["quantity"] == quantity]
 
 
-def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
-    return column(robot, quantities([robot]))
+def checks_in_order(robot: ReportedRobot) -> list[ReportedCheck]:
+    return checks_of_quantities(robot, quantities([robot]))
 
 
-def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
+def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
     """Map each heading of the table of robots to the quantities in the column."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
@@ -108,20 +108,20 @@ def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
     return heads
 
 
-def column(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
-    return [check for name in names for check in of_quantity(robot, name)]
+def checks_of_quantities(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
+    return [check for name in names for check in checks_of_quantity(robot, name)]
 
 
-def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
-    return worst_cell(column(robot, names))
+def worst_cell_of_quantities(robot: ReportedRobot, names: Sequence[str]) -> str:
+    return worst_cell(checks_of_quantities(robot, names))
 
 
 def worst_cell(checks: Sequence[ReportedCheck]) -> str:
-    return units(worst(check["worst"] for check in checks), compared=bool(checks))
+    return format_units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
-def share_cell(robot: ReportedRobot) -> str:
-    return percent(share_of(robot)) if robot["checks"] else ""
+def bound_ratio_cell(robot: ReportedRobot) -> str:
+    return format_ratio(bound_ratio_of(robot)) if robot["checks"] else ""
 
 
 def error_cells(line: ReportedAccuracyLine) -> list[str]:
@@ -138,14 +138,14 @@ def more_accurate(line: ReportedAccuracyLine) -> Literal["urdfkin", "Pinocchio",
 def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
     counts = Counter(more_accurate(line) for line in lines)
     return (
-        f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
+        f"urdfkin is more accurate in {counts['urdfkin']:,} of {format_count(len(lines), 'line')}, equal in "
         f"{counts['equal']:,}, less accurate in {counts['Pinocchio']:,}"
     )
 
 
 def accuracy_words(study: ReportedAccuracy) -> str:
     moving = " on a moving base" if study.get("moving_base") else ""
-    return f"{counted(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
+    return f"{format_count(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
 
 
 def second_oracle_title(robots: Sequence[ReportedRobot]) -> str | None:
@@ -165,7 +165,9 @@ def second_oracle_heads(title: str) -> list[str]:
 
 def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[tuple[str, list[str]]]:
     for name in quantities(robots):
-        checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
+        checks = [
+            check for robot in robots for check in checks_of_quantity(robot, name) if "second_oracle" in check
+        ]
         if checks:
             yield name, second_oracle_cells(checks, title)
 
@@ -185,15 +187,15 @@ def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str
     }
     return [
         f"{sum(check['results'] for check in checks):,}",
-        percent(worst(check["share_of_bound"] for check in checks)),
-        percent(worst(one["urdfkin"]["share_of_bound"] for one in found)),
-        percent(worst(one["pinocchio"]["share_of_bound"] for one in found)),
+        format_ratio(worst(check["bound_ratio"] for check in checks)),
+        format_ratio(worst(one["urdfkin"]["bound_ratio"] for one in found)),
+        format_ratio(worst(one["pinocchio"]["bound_ratio"] for one in found)),
         ", ".join(f"{who} ({count:,})" for who, count in outliers.items() if count) or "none",
     ]
 
 
-def share_of(robot: ReportedRobot) -> Units:
-    return worst(check["share_of_bound"] for check in robot["checks"])
+def bound_ratio_of(robot: ReportedRobot) -> Units:
+    return worst(check["bound_ratio"] for check in robot["checks"])
 
 
 def summary(document: Document) -> str:
@@ -202,12 +204,12 @@ def summary(document: Document) -> str:
     failed = sum(robot["failed"] for robot in robots)
     state = "interrupted: " if document["interrupted"] else ""
     return (
-        f"{state}{counted(len(robots), 'robot')}, {results:,} results compared, {failed:,} outside their"
+        f"{state}{format_count(len(robots), 'robot')}, {results:,} results compared, {failed:,} outside their"
         f" bound, {document['seconds']:.1f} s, seed {document['seed']}"
     )
 
 
-def counted(n: int, noun: str) -> str:
+def format_count(n: int, noun: str) -> str:
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
@@ -218,5 +220,5 @@ def verdict_counts(document: Document) -> dict[str, int]:
     return {verdict: count for verdict, count in counts.items() if count}
 
 
-def pinocchio(document: Document) -> str:
+def pinocchio_version(document: Document) -> str:
     return document["versions"].get("pin", "?")

@@ -139,17 +139,22 @@ class _AccuracyBatch:
             for row in validated():
                 if row.exact is not None and reference in row.references:
                     name = None if reference is None else reference.name.lower()
-                    yield _line(row.name, name, [self._compared(row, reference)])
+                    yield _make_line(row.name, name, [self._compute_samples(row, reference)])
         for name, representations in _REPRESENTATIONS.items():
-            yield _line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
+            yield _make_line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
 
-    def _compared(self, row: Quantity, reference: Reference | None) -> _AccuracySamples:
+    def _compute_samples(self, row: Quantity, reference: Reference | None) -> _AccuracySamples:
         reference = _ALIGNED if reference is None else reference
         query = self.part.query._replace(reference=reference)
         part = self.part._replace(reference=reference, query=query)
-        ours, theirs = own_results(row, part), oracle_results(row, self.oracle, query)
-        scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
-        return _AccuracySamples(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
+        urdfkin_results, pinocchio_results = own_results(row, part), oracle_results(row, self.oracle, query)
+        scale = np.broadcast_to(bound_of(row, part).scale, urdfkin_results.shape)
+        return _AccuracySamples(
+            urdfkin_results,
+            pinocchio_results,
+            self._true(row, reference).reshape(urdfkin_results.shape),
+            scale,
+        )
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
         return np.array(
@@ -159,11 +164,11 @@ class _AccuracyBatch:
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
         """Yield analytical Jacobians, except near a singularity or if a quaternion's sign is uncertain."""
-        poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
+        poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
         size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
         jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
-        R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
+        R, R_pinocchio = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
         moving = _moving_columns(J_v.scale)
         R_true, J_true = map(_INTERVALS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
         for name in representations:
@@ -177,10 +182,12 @@ class _AccuracyBatch:
                 everywhere = np.ones(clear.shape)
                 everywhere[clear] = apart
                 bound = euler_jacobian_bound(jacobian, size, everywhere)
-            ours = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
-            theirs = analytical_jacobian(name, R_theirs[clear], J_v.pinocchio[clear], 0.0)
-            ours, theirs, scale = (_columns(J, moving[clear]) for J in (ours, theirs, bound.scale[clear]))
-            yield _AccuracySamples(ours, theirs, true, scale)
+            urdfkin_results = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
+            pinocchio_results = analytical_jacobian(name, R_pinocchio[clear], J_v.pinocchio[clear], 0.0)
+            urdfkin_results, pinocchio_results, scale = (
+                _columns(J, moving[clear]) for J in (urdfkin_results, pinocchio_results, bound.scale[clear])
+            )
+            yield _AccuracySamples(urdfkin_results, pinocchio_results, true, scale)
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
@@ -209,24 +216,26 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
     return unit
 
 
-def _line(quantity: str, reference: str | None, compared: Sequence[_AccuracySamples]) -> AccuracyLine:
+def _make_line(quantity: str, reference: str | None, compared: Sequence[_AccuracySamples]) -> AccuracyLine:
     errors_of_each: tuple[list[FloatArray], list[FloatArray]] = [], []
-    for ours, theirs, true, scale in compared:
+    for urdfkin_results, pinocchio_results, true, scale in compared:
         nonzero = scale > 0.0
         units = np.maximum(EPS * scale[nonzero], LEAST_UNIT)
-        for errors, results in zip(errors_of_each, (ours, theirs), strict=True):
-            errors.append(_error(results[nonzero], true[nonzero]) / units)
+        for errors, results in zip(errors_of_each, (urdfkin_results, pinocchio_results), strict=True):
+            errors.append(_error_bound(results[nonzero], true[nonzero]) / units)
     own_errors, their_errors = map(np.concatenate, errors_of_each)
-    return AccuracyLine(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
+    return AccuracyLine(
+        quantity, reference, len(own_errors), _summarize_errors(own_errors), _summarize_errors(their_errors)
+    )
 
 
 @partial(np.vectorize, otypes=[float])
-def _error(x: float, true: Number) -> float:
+def _error_bound(x: float, true: Number) -> float:
     """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
     return float(abs(exact(true) - x).upper())
 
 
-def _errors(units: FloatArray) -> Errors:
+def _summarize_errors(units: FloatArray) -> Errors:
     if not units.size:
         return Errors(0.0, 0.0)
     return Errors(float(units.max()), float(np.sqrt((units * units).mean())))

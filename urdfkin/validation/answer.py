@@ -22,7 +22,7 @@ from urdfkin.system.documents import as_data, typed
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict
-from urdfkin.validation.error_stats import Key, Tally
+from urdfkin.validation.error_stats import ErrorStats, Key
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entries_of
 
@@ -31,56 +31,56 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    `passing` is True if the process or the cluster failed, and not the robot. Such a failure is not stored,
-    so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
+    `is_transient` is True if the process or the cluster failed, and not the robot. Such a failure is not
+    stored, so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
     """
 
     verdict: ValidationVerdict
     reason: str
     summary: RobotSummary = EMPTY_SUMMARY
     error: str | None = None
-    passing: bool = False
+    is_transient: bool = False
 
 
 Answer = ChunkResult | Failure
 
 
-def answer(chunk: Chunk) -> Answer:
+def answer_chunk(chunk: Chunk) -> Answer:
     """Run a chunk and return its result; every exception except an interrupt becomes a `Failure`."""
     try:
         return run_chunk(chunk)
     except Exception as error:
-        return failure(chunk.subject, error)
+        return make_failure(chunk.robot_input, error)
 
 
-def failure(subject: RobotInput, error: Exception) -> Failure:
+def make_failure(robot_input: RobotInput, error: Exception) -> Failure:
     if not isinstance(error, UrdfkinError):
-        return unexpected_failure(error)
+        return make_unexpected_failure(error)
     if isinstance(error, UrdfError):
         summary = RobotSummary(findings=entries_of(error.findings))
     else:
-        summary = _unchecked_summary(subject)
+        summary = _unchecked_summary(robot_input)
     is_oracle = isinstance(error, OracleError)
     verdict = ValidationVerdict.NOT_VERIFIED if is_oracle else ValidationVerdict.BAD_INPUT
     return Failure(verdict, str(error), summary)
 
 
-def _unchecked_summary(subject: RobotInput) -> RobotSummary:
+def _unchecked_summary(robot_input: RobotInput) -> RobotSummary:
     try:
-        return RobotSummary.of(subject.read(), None)
+        return RobotSummary.of(robot_input.read(), None)
     except Exception:
         return EMPTY_SUMMARY
 
 
-def unexpected_failure(error: Exception) -> Failure:
+def make_unexpected_failure(error: Exception) -> Failure:
     reason = f"unexpected error in urdfkin, please report it: {_name_and_message(error)}"
     text = "".join(traceback.format_exception(error))
     return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=text)
 
 
-def lost_failure(what: str, error: Exception) -> Failure:
+def make_lost_failure(what: str, error: Exception) -> Failure:
     reason = f"{what}: {_name_and_message(error)}"
-    return Failure(ValidationVerdict.NOT_VERIFIED, reason, passing=True)
+    return Failure(ValidationVerdict.NOT_VERIFIED, reason, is_transient=True)
 
 
 def _name_and_message(error: Exception) -> str:
@@ -93,25 +93,25 @@ CRASHED_TWICE = (
 )
 
 
-def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:
-    return Failure(ValidationVerdict.NOT_VERIFIED, f"{subject.label}: {reason}: found {cause}")
+def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Failure:
+    return Failure(ValidationVerdict.NOT_VERIFIED, f"{robot_input.label}: {reason}: found {cause}")
 
 
 _MAGIC = b"urdfkin-chunk/1\n"
-_DIGEST = hashlib.sha256().digest_size
+_DIGEST_SIZE = hashlib.sha256().digest_size
 #: Maximum size of an unpacked file, bytes; no answer of urdfkin is larger.
-_MOST = 2**27
+_MAX_BYTES = 2**27
 
 
 class DamagedError(Exception):
     """A file is damaged or belongs to another chunk; the message states the reason."""
 
 
-def encode_answer(key: str, found: Answer) -> bytes:
-    if isinstance(found, Failure):
-        return pack(key, {"failure": found})
-    rows = list(found.tallies.items())  # Keys of JSON objects must be strings.
-    return pack(key, {"tallies": rows, "result": replace(found, tallies={})})
+def encode_answer(key: str, answer: Answer) -> bytes:
+    if isinstance(answer, Failure):
+        return pack(key, {"failure": answer})
+    rows = list(answer.error_stats.items())  # Keys of JSON objects must be strings.
+    return pack(key, {"error_stats": rows, "result": replace(answer, error_stats={})})
 
 
 def decode_answer(key: str, content: bytes) -> Answer:
@@ -119,8 +119,8 @@ def decode_answer(key: str, content: bytes) -> Answer:
     try:
         if "failure" in body:
             return typed(body["failure"], Failure)
-        tallies = dict(typed(body["tallies"], list[tuple[Key, Tally]]))
-        return replace(typed(body["result"], ChunkResult), tallies=tallies)
+        error_stats = dict(typed(body["error_stats"], list[tuple[Key, ErrorStats]]))
+        return replace(typed(body["result"], ChunkResult), error_stats=error_stats)
     except (ValueError, KeyError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 
@@ -132,13 +132,13 @@ def pack(key: str, body: dict[str, Any]) -> bytes:
 
 
 def unpack(key: str, content: bytes) -> dict[str, Any]:
-    checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
+    checksum, data = content[len(_MAGIC) :][:_DIGEST_SIZE], content[len(_MAGIC) + _DIGEST_SIZE :]
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin")
     if hashlib.sha256(data).digest() != checksum:
         raise DamagedError("the checksum in the file does not match its content")
     try:
-        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MOST))
+        body: dict[str, Any] = json.loads(zlib.decompressobj().decompress(data, _MAX_BYTES))
         if body["key"] != key:
             raise DamagedError("the file belongs to another chunk")
     except (ValueError, KeyError, TypeError, zlib.error, RecursionError) as error:

@@ -21,14 +21,14 @@ from urdfkin.compiled.preload import are_on_disk
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
-from urdfkin.validation.answer import Answer, Failure, failure, unexpected_failure
-from urdfkin.validation.chunk import Cut
+from urdfkin.validation.answer import Answer, Failure, make_failure, make_unexpected_failure
+from urdfkin.validation.chunk import Chunking
 from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.results import RobotReport, ValidationReport
-from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
-from urdfkin.validation.store import AccuracyResult, FailedStudy, Manifest, Store, open_store
+from urdfkin.validation.robot_input import RobotInput, RobotSource, make_robot_inputs
+from urdfkin.validation.store import AccuracyStore, FailedStudy, Manifest, Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
@@ -84,9 +84,9 @@ def validate(
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
         executor: An executor that runs the chunks; None: local processes run them. The executor has the
-            interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connected`).
+            interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
-            run. The function `stored` makes a report from the folder at any time.
+            run. The function `read_stored_report` makes a report from the folder at any time.
         retry: "failed": repeat the check of robots that could not be checked before. The files of these
             robots may have changed since then.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
@@ -121,45 +121,51 @@ def validate(
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
     pinocchio()  # If Pinocchio is missing, an error is raised before the work starts.
-    found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
+    robot_inputs, unread = make_robot_inputs(given, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
-        found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
-    cut = Cut(samples)
-    collector = ResultCollector(found, cut, chunks_of_shard(len(found), cut, shard), progress)
+        robot_inputs = [replace(x, origin=replace(x.origin, oracle=oracle)) for x in robot_inputs]
+    chunking = Chunking(samples)
+    collector = ResultCollector(
+        robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
+    )
     # An executor may run chunks on other machines, and each machine computes its own memory limit.
     memory_limit = memory.limit(jobs) if executor is None else None
-    campaign = _Campaign(found, cut, seed, memory_limit, collector)
+    campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
     with contextlib.ExitStack() as stack:
         saved = None
         if folder is not None:
-            manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
+            manifest = Manifest.of(robot_inputs, samples, seed, started.isoformat(timespec="seconds"))
             context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
             saved = stack.enter_context(context)
         try:
             if saved is not None:
-                campaign.use(saved)
+                campaign.load_answers(saved)
             for i, error in unread.items():
                 # After this failure, no chunk of the robot is missing, so the loop ends after one chunk.
-                for index in collector.missing(i):
-                    campaign.enter(campaign.task(i, index), failure(found[i], error))
-            missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
-            if _kernels_pay(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
+                for index in collector.missing_chunks(i):
+                    campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
+            missing = [
+                robot
+                for i, robot in enumerate(robot_inputs)
+                if any(True for _ in collector.missing_chunks(i))
+            ]
+            if _should_compile(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
                 # If a worker compiled the kernels, the compilation would count as a robot's computing time.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
-            _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
+            _engine(jobs, isolate, executor).run(campaign.work(), campaign.save)
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
-            collector.give_up(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
+            collector.fail_unfinished(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # Finished results stay in the report.
-            collector.give_up(unexpected_failure(error))
+            collector.fail_unfinished(make_unexpected_failure(error))
     reports = tuple(collector.reports())
     return ValidationReport(
         robots=reports,
-        asked=len(reports),
+        robots_requested=len(reports),
         samples=samples,
         seed=seed,
         started=started.isoformat(timespec="seconds"),
@@ -180,42 +186,44 @@ def _folder(store: str | os.PathLike[str]) -> Path:
     return Path(os.fsdecode(name))
 
 
-def _can_be_loaded(subject: RobotInput) -> bool:
+def _can_be_loaded(robot_input: RobotInput) -> bool:
     """Return whether a robot can be loaded; if not, the robot's first chunk reports the error."""
     try:
-        subject.load()
+        robot_input.load()
     except Exception:
         return False
     return True
 
 
-def stored(folder: str | os.PathLike[str]) -> ValidationReport:
+def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
     """Return the report of a store; the report of an incomplete store is marked as interrupted."""
-    store = Store.reading(Path(folder), _warn)
+    store = Store.open_read_only(Path(folder), _warn)
     store.check_names()
-    manifest, found = store.manifest, store.manifest.subjects()
-    collector = ResultCollector(found, manifest.cut, chunks_of_shard(len(found), manifest.cut))
-    _Campaign(found, manifest.cut, manifest.seed, None, collector).use(store)
+    manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()
+    collector = ResultCollector(
+        robot_inputs, manifest.chunking, chunks_of_shard(len(robot_inputs), manifest.chunking)
+    )
+    _Campaign(robot_inputs, manifest.chunking, manifest.seed, None, collector).load_answers(store)
     reports, progress = tuple(collector.reports()), collector.state()
     studies, all_studied = _studies(store, reports)
     return ValidationReport(
         robots=reports,
-        asked=len(reports),
+        robots_requested=len(reports),
         samples=manifest.samples,
         seed=manifest.seed,
         started=manifest.started,
         seconds=sum(robot.seconds for robot in reports),
         interrupted=progress.chunks_done < progress.chunks or not all_studied,
-        made_by=manifest.versions,
+        library_versions=manifest.versions,
         studies=studies,
     )
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    if (results := AccuracyResult.of(store)) is None:
+    if (results := AccuracyStore.open(store)) is None:
         return (), True
-    found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
-    return tuple(None if isinstance(one, FailedStudy) else one for one in found), None not in found
+    studies = [results.read(i) for i, report in enumerate(reports) if report.error_stats]
+    return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
 #: Kernels save time if the number of samples is larger than these numbers.
@@ -223,48 +231,48 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
-def _kernels_pay(samples: int) -> bool:
+def _should_compile(samples: int) -> bool:
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 
 @dataclass
 class _Campaign:
-    subjects: Sequence[RobotInput]
-    cut: Cut
+    robot_inputs: Sequence[RobotInput]
+    chunking: Chunking
     seed: int
     memory: int | None
     collector: ResultCollector
     store: Store | None = None
 
     def task(self, robot: int, index: int) -> Task:
-        return Task(robot, self.cut.chunk(self.subjects[robot], self.seed, index, self.memory))
+        return Task(robot, self.chunking.chunk(self.robot_inputs[robot], self.seed, index, self.memory))
 
-    def use(self, store: Store) -> None:
-        for robot in range(len(self.subjects)):
-            for index in self.collector.missing(robot):
-                if (found := store.answer(robot, index)) is not None:
-                    self.collector.enter(self.task(robot, index), found, kept=True)
+    def load_answers(self, store: Store) -> None:
+        for robot in range(len(self.robot_inputs)):
+            for index in self.collector.missing_chunks(robot):
+                if (answer := store.read_answer(robot, index)) is not None:
+                    self.collector.add(self.task(robot, index), answer, from_earlier_run=True)
         self.store = store
 
     def work(self) -> Iterator[Iterator[Task]]:
-        return (self._tasks(robot) for robot in range(len(self.subjects)))
+        return (self._tasks(robot) for robot in range(len(self.robot_inputs)))
 
     def _tasks(self, robot: int) -> Iterator[Task]:
-        return (self.task(robot, index) for index in self.collector.missing(robot))
+        return (self.task(robot, index) for index in self.collector.missing_chunks(robot))
 
-    def enter(self, task: Task, found: Answer) -> None:
-        if self.store is not None and not (isinstance(found, Failure) and found.passing):
-            self.store.keep(task.robot, task.chunk.index, found)
-        self.collector.enter(task, found)
+    def save(self, task: Task, answer: Answer) -> None:
+        if self.store is not None and not (isinstance(answer, Failure) and answer.is_transient):
+            self.store.write_answer(task.robot, task.chunk.index, answer)
+        self.collector.add(task, answer)
 
 
-def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
+def chunks_of_shard(robots: int, chunking: Chunking, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
     The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read by
     one shard only.
 
-    >>> chunks_of_shard(2, Cut(1000), "1/4"), chunks_of_shard(2, Cut(1000), "4/4")
+    >>> chunks_of_shard(2, Chunking(1000), "1/4"), chunks_of_shard(2, Chunking(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
     """
     match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", "1/1" if shard is None else shard)
@@ -275,13 +283,13 @@ def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[ran
             remedy="for a validation in four parts write 1/4, ..., 4/4",
         )
     part, parts = int(match[1]), int(match[2])
-    size = len(cut)
+    size = len(chunking)
     start, stop = (part - 1) * robots * size // parts, part * robots * size // parts
-    found = []
+    shards = []
     for robot in range(robots):
         low, high = (min(max(end - robot * size, 0), size) for end in (start, stop))
-        found.append(range(low, high) if low < high else range(0))
-    return found
+        shards.append(range(low, high) if low < high else range(0))
+    return shards
 
 
 def _warn(message: str) -> None:

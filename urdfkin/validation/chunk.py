@@ -26,7 +26,14 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, without_mimic_rules
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
-from urdfkin.validation.error_stats import CrossCheck, Inputs, Key, Tally, cross_check, tally
+from urdfkin.validation.error_stats import (
+    CrossCheck,
+    ErrorStats,
+    Inputs,
+    Key,
+    compute_error_stats,
+    make_cross_check,
+)
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
 from urdfkin.verify.bounds import Bound, magnitudes
@@ -35,9 +42,9 @@ from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
 #: Number of samples in one draw.
-DRAWN = 25
+DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
-SPECIAL = 3
+SPECIAL_SAMPLES = 3
 #: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
 _MIN_CHUNKS = 8
 #: Maximum number of draws in a chunk.
@@ -56,7 +63,7 @@ class Chunk:
     check of the robot may use `memory` bytes; None means half of the machine's free memory.
     """
 
-    subject: RobotInput
+    robot_input: RobotInput
     seed: int
     index: int
     first: int
@@ -65,19 +72,19 @@ class Chunk:
 
     @property
     def configurations(self) -> int:
-        return self.samples + (SPECIAL if self.first == 0 else 0)
+        return self.samples + (SPECIAL_SAMPLES if self.first == 0 else 0)
 
     @property
     def first_sample(self) -> int:
-        return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
+        return 0 if self.first == 0 else SPECIAL_SAMPLES + self.first * DRAW_SIZE
 
     def draw(self, tree: KinematicTree) -> Samples:
-        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
+        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
-        samples = min(DRAWN, self.samples - i * DRAWN)
+        samples = min(DRAW_SIZE, self.samples - i * DRAW_SIZE)
         return draw_samples(tree, samples, rng, with_special=self.first + i == 0)
 
 
@@ -91,7 +98,7 @@ class Timings:
     compare: float = 0.0
     second: float = 0.0
 
-    def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call a function. Add its computing time (s) to the attribute named by `part`, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
@@ -120,7 +127,7 @@ class ChunkResult:
     name: str
     joints: tuple[str, ...]
     frames: tuple[str, ...]
-    tallies: dict[Key, Tally]
+    error_stats: dict[Key, ErrorStats]
     samples: int
     seconds: float
     timings: Timings
@@ -131,7 +138,7 @@ class ChunkResult:
             name=self.name,
             joints=self.joints,
             frames=self.frames,
-            tallies={key: tally + other.tallies[key] for key, tally in self.tallies.items()},
+            error_stats={key: stats + other.error_stats[key] for key, stats in self.error_stats.items()},
             samples=self.samples + other.samples,
             seconds=self.seconds + other.seconds,
             timings=self.timings + other.timings,
@@ -140,10 +147,10 @@ class ChunkResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
+class Chunking:
     """Division of each robot's samples into chunks, which depends only on the number of samples.
 
-    >>> len(Cut(1000)), len(Cut(10_000)), len(Cut(1_000_000)), len(Cut(0))
+    >>> len(Chunking(1000)), len(Chunking(10_000)), len(Chunking(1_000_000)), len(Chunking(0))
     (8, 10, 1000, 1)
     """
 
@@ -151,24 +158,24 @@ class Cut:
 
     @property
     def _draws(self) -> int:
-        return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
+        return min(_MAX_DRAWS, max(1, -(-self.samples // DRAW_SIZE) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
         """Number of chunks of a robot: at least one, because the special configurations need a chunk."""
-        return max(1, -(-self.samples // (self._draws * DRAWN)))
+        return max(1, -(-self.samples // (self._draws * DRAW_SIZE)))
 
-    def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
+    def chunk(self, robot_input: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
         first = index * self._draws
-        samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
-        return Chunk(subject, seed, index, first, samples, most)
+        samples = min(self._draws * DRAW_SIZE, self.samples - first * DRAW_SIZE)
+        return Chunk(robot_input, seed, index, first, samples, most)
 
     def configurations(self, chunks: range) -> int:
         """Return the number of samples in a range of chunks, including the special configurations."""
         if not chunks:
             return 0
-        size = self._draws * DRAWN
+        size = self._draws * DRAW_SIZE
         random = min(self.samples, chunks.stop * size) - chunks.start * size
-        return random + (SPECIAL if chunks.start == 0 else 0)
+        return random + (SPECIAL_SAMPLES if chunks.start == 0 else 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,32 +184,37 @@ class SecondOracleModel:
     oracle: Oracle
 
     def cross_check(
-        self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
+        self,
+        block: _Block,
+        row: Quantity,
+        reference: Reference | None,
+        results: FloatArray,
+        oracle_results: FloatArray,
     ) -> CrossCheck:
-        second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
+        second = block.timings.time_call("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
         if row.of == "joints":
-            bounds = (block.joint_part(one) for one in bounds)
-        return cross_check(self.library.name, ours, theirs, second, *bounds)
+            bounds = (block.joint_bound(one) for one in bounds)
+        return make_cross_check(self.library.name, results, oracle_results, second, *bounds)
 
 
-def tallies(
+def compare_frames(
     robot: Robot,
     oracle: Oracle,
     x: Samples,
     first_sample: int,
     timings: Timings,
     second: SecondOracleModel | None = None,
-) -> dict[Key, Tally]:
+) -> dict[Key, ErrorStats]:
     """Return the error statistics of each quantity of a robot in each reference frame."""
-    found: dict[Key, Tally] = {}
+    found: dict[Key, ErrorStats] = {}
     work = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_bytes(len(x.q), robot.nv)):
-        for key, part in _Block(*work, frames).tallies(second):
-            found[key] = found[key].beside(part) if key in found else part
-    screws = reduce(Tally.beside, _Screws(*work).tallies())
+        for key, part in _Block(*work, frames).compare(second):
+            found[key] = found[key].join_frames(part) if key in found else part
+    screws = reduce(ErrorStats.join_frames, _Screws(*work).compare())
     return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
 
 
@@ -211,8 +223,10 @@ class _ComparisonBatch:
         self.robot, self.oracle, self.x, self.first, self.timings = robot, oracle, x, first_sample, timings
         self.inputs: list[Inputs] = list(zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True))
 
-    def tally(self, ours: FloatArray, theirs: FloatArray, bound: Bound, names: tuple[str, ...]) -> Tally:
-        return tally(ours, theirs, bound, names, self.first, self.inputs)
+    def _compute_stats(
+        self, results: FloatArray, oracle_results: FloatArray, bound: Bound, names: tuple[str, ...]
+    ) -> ErrorStats:
+        return compute_error_stats(results, oracle_results, bound, names, self.first, self.inputs)
 
 
 class _Block(_ComparisonBatch):
@@ -236,7 +250,7 @@ class _Block(_ComparisonBatch):
         self.joint_rows = [link - frames.start for link in moving[joints]]
         self.joint_names = robot.joint_names[joints]
 
-    def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
+    def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
         """Yield error statistics for the frames and the joints of the block.
 
         For a joint, urdfkin's result is the result for the joint's child link. Pinocchio computes the joint
@@ -246,14 +260,14 @@ class _Block(_ComparisonBatch):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.timings.timed("urdfkin", row.ours, self.plan, inputs, reference)
+                results = self.timings.time_call("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
-                yield self._compare(row, reference, ours, bound, second)
+                yield self._compare(row, reference, results, bound, second)
                 for joint in joints:
-                    own, joint_bound = ours[:, self.joint_rows], self.joint_part(bound)
+                    own, joint_bound = results[:, self.joint_rows], self.joint_bound(bound)
                     yield self._compare(joint, reference, own, joint_bound, second)
 
-    def joint_part(self, bound: Bound) -> Bound:
+    def joint_bound(self, bound: Bound) -> Bound:
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -267,15 +281,17 @@ class _Block(_ComparisonBatch):
         self,
         row: Quantity,
         reference: Reference | None,
-        ours: FloatArray,
+        results: FloatArray,
         bound: Bound,
         second: SecondOracleModel | None,
-    ) -> tuple[Key, Tally]:
+    ) -> tuple[Key, ErrorStats]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.timings.timed("pinocchio", row.ask, self.oracle, self.query(row, reference))
-        found = self.tally(ours, theirs, bound, names)
+        oracle_results = self.timings.time_call("pinocchio", row.ask, self.oracle, self.query(row, reference))
+        found = self._compute_stats(results, oracle_results, bound, names)
         if second is not None:
-            found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
+            found = replace(
+                found, cross_check=second.cross_check(self, row, reference, results, oracle_results)
+            )
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
@@ -285,34 +301,36 @@ class _Screws(_ComparisonBatch):
     Each column of `data.J` equals a column of one joint's Jacobian in the reference frame WORLD.
     """
 
-    def tallies(self) -> Iterator[Tally]:
+    def compare(self) -> Iterator[ErrorStats]:
         robot, x = self.robot, self.x
         tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.timings.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(
-            1, 2
-        )
+        oracle_results = self.timings.time_call(
+            "pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))
+        ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in memory.blocks(len(moving), memory.frame_bytes(len(x.q), tree.nv)):
             joints = moving[block]
             width = sum(tree.joints[i].kind.nv for i in joints)
-            yield self._block(tree, q_free, joints, theirs[:, column : column + width])
+            yield self._compare_block(tree, q_free, joints, oracle_results[:, column : column + width])
             column += width
 
-    def _block(self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], theirs: FloatArray) -> Tally:
+    def _compare_block(
+        self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], oracle_results: FloatArray
+    ) -> ErrorStats:
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, FIXED_BASE_STATE)
-        J = self.timings.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.timings.time_call("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
-        ours = J[:, frame, :, column].swapaxes(0, 1)
+        results = J[:, frame, :, column].swapaxes(0, 1)
         scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
         names = tuple(tree.joints[joints[f]].name for f, _ in own)
-        return self.tally(ours, theirs, Bound(scale, bound.k[:, frame, 0]), names)
+        return self._compute_stats(results, oracle_results, Bound(scale, bound.k[:, frame, 0]), names)
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
@@ -333,18 +351,18 @@ _cache: dict[RobotInput, _Models] = {}
 
 
 def _load(chunk: Chunk) -> _Models:
-    if (found := _cache.get(chunk.subject)) is not None:
-        return found
+    if (models := _cache.get(chunk.robot_input)) is not None:
+        return models
     _cache.clear()
-    robot = chunk.subject.load()
+    robot = chunk.robot_input.load()
     most = memory.limit() if chunk.memory is None else chunk.memory
-    memory.check(robot.tree, chunk.samples + SPECIAL, most)  # The first chunk is the largest.
+    memory.check(robot.tree, chunk.samples + SPECIAL_SAMPLES, most)  # The first chunk is the largest.
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
         second = SecondOracleModel(by, robot.verifier.oracle(by=by))
-    found = robot, robot.verifier.oracle(), second
-    _cache[chunk.subject] = found
-    return found
+    models = robot, robot.verifier.oracle(), second
+    _cache[chunk.robot_input] = models
+    return models
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
@@ -352,14 +370,14 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
     robot, oracle, second = _load(chunk)
     summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
     timings.read = time.perf_counter() - begin
-    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
+    found = compare_frames(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
     seconds = time.perf_counter() - begin
     timings.close(seconds)
     return ChunkResult(
         name=robot.name,
         joints=robot.joint_names,
         frames=robot.all_frames,
-        tallies=found,
+        error_stats=found,
         samples=chunk.configurations,
         seconds=seconds,
         timings=timings,

@@ -25,8 +25,15 @@ from distributed import Client, Future, KilledWorker, Scheduler, SpecCluster, Wo
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation import remote, results
-from urdfkin.validation.answer import CRASHED_TWICE, Answer, Failure, crash_failure, failure, lost_failure
-from urdfkin.validation.engines import Enter, Task, Work
+from urdfkin.validation.answer import (
+    CRASHED_TWICE,
+    Answer,
+    Failure,
+    make_crash_failure,
+    make_failure,
+    make_lost_failure,
+)
+from urdfkin.validation.engines import AnswerCallback, Task, Work
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
@@ -40,7 +47,7 @@ _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
 #: If the scheduler has one of these packages, its version must equal the version in this process.
-_COMPARED = ("urdfkin", "pin")
+_COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
 
@@ -49,7 +56,7 @@ class ClusterError(UrdfkinError, RuntimeError):
 
 
 @contextmanager
-def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
+def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
     `scheduler` is the address of a running scheduler, such as `tls://host:8786`, or `local:N` for N workers
@@ -159,7 +166,7 @@ def _check_versions(client: Client) -> None:
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
             raise ClusterError("a worker cannot run urdfkin", where=worker, found=str(found), remedy=remedy)
         _check_code(worker, found)
-    for name in _COMPARED:
+    for name in _COMPARED_PACKAGES:
         try:
             found = client.run_on_scheduler(metadata.version, name)
         except Exception:  # The scheduler computes nothing and does not need the package.
@@ -169,12 +176,12 @@ def _check_versions(client: Client) -> None:
             _raise_difference("scheduler", [f"{name} {found} on the cluster and {own} on this machine"])
 
 
-def _check_code(worker: str, found: dict[str, str]) -> None:
+def _check_code(worker: str, versions_on_cluster: dict[str, str]) -> None:
     local = provenance()
     differences = [
-        f"{k} {found.get(k, 'none')[:12]} on the cluster and {local[k][:12]} on this machine"
+        f"{k} {versions_on_cluster.get(k, 'none')[:12]} on the cluster and {local[k][:12]} on this machine"
         for k in local
-        if found.get(k) != local[k]
+        if versions_on_cluster.get(k) != local[k]
     ]
     if differences:
         _raise_difference(worker, differences)
@@ -200,30 +207,32 @@ class Cluster:
         self._in_use = Counter[int]()
         self._limit, self._counted = _MORE, float("-inf")
 
-    def run(self, work: Work, enter: Enter) -> None:
+    def run(self, work: Work, on_answer: AnswerCallback) -> None:
         waiting, failed = chain.from_iterable(work), set[int]()
         completed = as_completed(loop=self._client.loop)
         try:
             while True:
-                while len(self._pending) < self._limit_now() and (task := next(waiting, None)) is not None:
+                while (
+                    len(self._pending) < self._current_limit() and (task := next(waiting, None)) is not None
+                ):
                     if task.robot in failed:
                         continue
                     try:
                         completed.add(self._send(task, 1))
                     except (UrdfkinError, OSError) as error:  # The text of the robot cannot be read.
                         failed.add(task.robot)
-                        enter(task, failure(task.chunk.subject, error))
+                        on_answer(task, make_failure(task.chunk.robot_input, error))
                 if not self._pending:
                     return
                 future = next(completed)
                 task, tries = self._pending.pop(future)
-                found = self._found(future, task, tries)
-                if found is None:
+                answer = self._take_answer(future, task, tries)
+                if answer is None:
                     completed.add(self._send(task, tries + 1))
                 else:
-                    if isinstance(found, Failure):
+                    if isinstance(answer, Failure):
                         failed.add(task.robot)
-                    enter(task, found)
+                    on_answer(task, answer)
                 self._forget(task.robot)
         finally:
             if self._client.status == "running":
@@ -231,7 +240,7 @@ class Cluster:
             self._pending.clear()
             self._robots.clear()
 
-    def _limit_now(self) -> int:
+    def _current_limit(self) -> int:
         if time.monotonic() - self._counted > _INTERVAL and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._limit, self._counted = _PER_THREAD * threads + _MORE, time.monotonic()
@@ -239,9 +248,9 @@ class Cluster:
 
     def _send(self, task: Task, tries: int) -> Future[Any]:
         if (robot := self._robots.get(task.robot)) is None:
-            data = pickle.dumps(task.chunk.subject.carried())
-            robot = self._robots[task.robot] = self._client.submit(remote.hold, data, pure=False)
-        chunk = pickle.dumps(replace(task.chunk, subject=_NO_ROBOT))
+            data = pickle.dumps(task.chunk.robot_input.with_text())
+            robot = self._robots[task.robot] = self._client.submit(remote.store_robot, data, pure=False)
+        chunk = pickle.dumps(replace(task.chunk, robot_input=_NO_ROBOT))
         future = self._client.submit(remote.run, robot, chunk, provenance(), pure=False)
         self._pending[future] = task, tries
         self._in_use[task.robot] += 1
@@ -254,23 +263,23 @@ class Cluster:
             del self._in_use[robot]
             self._robots.pop(robot, None)
 
-    def _found(self, future: Future[Any], task: Task, tries: int) -> Answer | None:
+    def _take_answer(self, future: Future[Any], task: Task, tries: int) -> Answer | None:
         """Return the answer of a finished chunk; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()
             except OSError as lost:  # The scheduler, which transfers results, is lost.
-                raise self._lost() from lost
+                raise self._make_lost_error() from lost
             return _answer(result, task)
         if self._client.status != "running":
-            raise self._lost()
+            raise self._make_lost_error()
         error = future.exception() if future.status == "error" else None
         if tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
             return None
         known = error if isinstance(error, Exception) else RuntimeError(future.status)
-        return lost_failure("the cluster lost the chunk", known)
+        return make_lost_failure("the cluster lost the chunk", known)
 
-    def _lost(self) -> ClusterError:
+    def _make_lost_error(self) -> ClusterError:
         return ClusterError(
             "the connection to the scheduler is lost",
             where=str(self._client.scheduler.address if self._client.scheduler else "the cluster"),
@@ -278,10 +287,10 @@ class Cluster:
         )
 
 
-def _answer(found: remote.Found, task: Task) -> Answer:
-    if found[0] == "died":
-        return crash_failure(task.chunk.subject, CRASHED_TWICE, found[1])
-    if found[0] == "other code":
-        _check_code("a worker", found[1])
-    answer: Answer = pickle.loads(found[1])  # type: ignore[arg-type]
+def _answer(outcome: remote.ChunkOutcome, task: Task) -> Answer:
+    if outcome[0] == "died":
+        return make_crash_failure(task.chunk.robot_input, CRASHED_TWICE, outcome[1])
+    if outcome[0] == "other code":
+        _check_code("a worker", outcome[1])
+    answer: Answer = pickle.loads(outcome[1])  # type: ignore[arg-type]
     return answer

@@ -12,10 +12,10 @@ from functools import reduce
 from operator import add
 
 from urdfkin.validation.answer import Answer, Failure
-from urdfkin.validation.chunk import ChunkResult, Cut
+from urdfkin.validation.chunk import Chunking, ChunkResult
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
-from urdfkin.validation.error_stats import Key, Tally, plus
+from urdfkin.validation.error_stats import ErrorStats, Key, add_cross_checks
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
@@ -29,7 +29,7 @@ class CampaignProgress:
     Attributes:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
-        chunks_kept: Number of finished chunks from an earlier run.
+        chunks_from_earlier_run: Number of finished chunks from an earlier run.
         failures: Number of robots so far that have a disagreement or could not be checked.
     """
 
@@ -37,7 +37,7 @@ class CampaignProgress:
     robots: int
     chunks_done: int
     chunks: int
-    chunks_kept: int
+    chunks_from_earlier_run: int
     failures: int
     label: str
 
@@ -50,31 +50,34 @@ class ResultCollector:
 
     def __init__(
         self,
-        subjects: Sequence[RobotInput],
-        cut: Cut,
+        robot_inputs: Sequence[RobotInput],
+        chunking: Chunking,
         parts: Sequence[range],
         progress: Progress | None = None,
     ) -> None:
-        self._subjects, self._cut, self._progress = subjects, cut, progress
+        self._robot_inputs, self._chunking, self._progress = robot_inputs, chunking, progress
         self._robots = [_RobotAnswers(part) for part in parts]
         self._chunks = sum(map(len, parts))
         self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
         if self._progress is not None:
-            self._progress(self.state(self._subjects[0].label if self._subjects else ""))
+            self._progress(self.state(self._robot_inputs[0].label if self._robot_inputs else ""))
 
-    def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Add an answer, and report the progress; `kept` is True if an earlier run computed the answer."""
+    def add(self, task: Task, answer: Answer, *, from_earlier_run: bool = False) -> None:
+        """Add an answer, and report the progress.
+
+        `from_earlier_run` is True if an earlier run computed the answer.
+        """
         robot = self._robots[task.robot]
-        was_over, had_failed, before = robot.over, robot.has_failed, robot.done
-        robot.enter(task.chunk.index, found)
+        was_complete, had_failed, before = robot.is_complete, robot.has_failed, robot.done
+        robot.add(task.chunk.index, answer)
         self._chunks_done += robot.done - before
-        self._from_earlier += kept * (robot.done - before)
-        self._robots_done += robot.over and not was_over
+        self._from_earlier += from_earlier_run * (robot.done - before)
+        self._robots_done += robot.is_complete and not was_complete
         self._failures += robot.has_failed and not had_failed
         if self._progress is not None:
-            self._progress(self.state(self._subjects[task.robot].label))
+            self._progress(self.state(self._robot_inputs[task.robot].label))
 
     def state(self, label: str = "") -> CampaignProgress:
         return CampaignProgress(
@@ -82,12 +85,12 @@ class ResultCollector:
             robots=sum(bool(robot.part) for robot in self._robots),
             chunks_done=self._chunks_done,
             chunks=self._chunks,
-            chunks_kept=self._from_earlier,
+            chunks_from_earlier_run=self._from_earlier,
             failures=self._failures,
             label=label,
         )
 
-    def missing(self, robot: int) -> Iterator[int]:
+    def missing_chunks(self, robot: int) -> Iterator[int]:
         known = self._robots[robot]
         for index in known.part:
             if known.failures:
@@ -95,15 +98,15 @@ class ResultCollector:
             if index not in known:
                 yield index
 
-    def give_up(self, found: Failure) -> None:
+    def fail_unfinished(self, failure: Failure) -> None:
         for robot in self._robots:
-            if not robot.over:
-                robot.failures[len(self._cut)] = found
+            if not robot.is_complete:
+                robot.failures[len(self._chunking)] = failure
 
     def reports(self) -> Iterator[RobotReport]:
-        for subject, robot in zip(self._subjects, self._robots, strict=True):
+        for robot_input, robot in zip(self._robot_inputs, self._robots, strict=True):
             if robot.part:
-                yield robot.report(subject, self._cut.configurations(robot.part))
+                yield robot.report(robot_input, self._chunking.configurations(robot.part))
 
 
 class _RobotAnswers:
@@ -114,24 +117,24 @@ class _RobotAnswers:
         self._sums: list[tuple[range, ChunkResult]] = []
         self._has_disagreed = False
 
-    def enter(self, index: int, found: Answer) -> None:
-        if isinstance(found, Failure):
-            self.failures[index] = found
+    def add(self, index: int, answer: Answer) -> None:
+        if isinstance(answer, Failure):
+            self.failures[index] = answer
         else:
-            self._has_disagreed = self._has_disagreed or any(_outside(found.tallies))
-            self._add(range(index, index + 1), found)
+            self._has_disagreed = self._has_disagreed or any(_outside(answer.error_stats))
+            self._add_result(range(index, index + 1), answer)
 
-    def _add(self, chunks: range, found: ChunkResult) -> None:
+    def _add_result(self, chunks: range, result: ChunkResult) -> None:
         """Insert a result; if adjacent chunks have results, replace these results by the sum."""
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1
-            before, result = self._sums.pop(at)
-            chunks, found = range(before.start, chunks.stop), result + found
+            before, earlier = self._sums.pop(at)
+            chunks, result = range(before.start, chunks.stop), earlier + result
         if at < len(self._sums) and self._sums[at][0].start == chunks.stop:
-            after, result = self._sums.pop(at)
-            chunks, found = range(chunks.start, after.stop), found + result
-        self._sums.insert(at, (chunks, found))
+            after, later = self._sums.pop(at)
+            chunks, result = range(chunks.start, after.stop), result + later
+        self._sums.insert(at, (chunks, result))
 
     def __contains__(self, index: int) -> bool:
         return index in self.failures or any(index in run for run, _ in self._sums)
@@ -146,61 +149,65 @@ class _RobotAnswers:
         return len(self.part) if self.failures else sum(len(run) for run, _ in self._sums)
 
     @property
-    def over(self) -> bool:
+    def is_complete(self) -> bool:
         return self.done == len(self.part)
 
-    def report(self, subject: RobotInput, wanted: int) -> RobotReport:
+    def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
         # The number of results after a failed chunk depends on the workers' speed.
         # Therefore, these results are left out.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
-        results = [result for run, result in self._sums if run.start < last]
-        found = reduce(add, results) if results else None
-        tallies = found.tallies if found else {}
-        summary = (found.summary if found else None) or EMPTY_SUMMARY
+        results = [each for run, each in self._sums if run.start < last]
+        result = reduce(add, results) if results else None
+        error_stats = result.error_stats if result else {}
+        summary = (result.summary if result else None) or EMPTY_SUMMARY
         if failure is not None and summary is EMPTY_SUMMARY:
             summary = failure.summary
-        samples = found.samples if found else 0
-        verdict, reasons = _verdict(tallies, summary, failure, samples, wanted)
-        name = found.name if found else summary.model["name"] if summary.model else subject.label
+        samples = result.samples if result else 0
+        verdict, reasons = _verdict(error_stats, summary, failure, samples, requested_samples)
+        name = result.name if result else summary.model["name"] if summary.model else robot_input.label
         return RobotReport(
-            origin=subject.origin,
+            origin=robot_input.origin,
             name=name,
             verdict=verdict,
             reason="; ".join(reasons) or None,
-            joints=found.joints if found else (),
-            frames=found.frames if found else (),
-            tallies=tallies,
+            joints=result.joints if result else (),
+            frames=result.frames if result else (),
+            error_stats=error_stats,
             samples=samples,
-            seconds=found.seconds if found else 0.0,
+            seconds=result.seconds if result else 0.0,
             summary=summary,
-            timings=found.timings if found else None,
+            timings=result.timings if result else None,
             error=failure.error if failure else None,
         )
 
 
 def _verdict(
-    tallies: dict[Key, Tally], summary: RobotSummary, failure: Failure | None, samples: int, wanted: int
+    error_stats: dict[Key, ErrorStats],
+    summary: RobotSummary,
+    failure: Failure | None,
+    samples: int,
+    requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
     """Return the verdict on a robot and its reasons; a disagreement takes precedence."""
-    disagreements = [*_outside(tallies), *summary.disagreements]
+    disagreements = [*_outside(error_stats), *summary.disagreements]
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
-    elif samples < wanted:
+    elif samples < requested_samples:
         verdict = ValidationVerdict.NOT_VERIFIED
-        reasons = [f"interrupted: {samples:,} of {wanted:,} samples were compared"]
-    elif not any(tally.results for tally in tallies.values()):
+        reasons = [f"interrupted: {samples:,} of {requested_samples:,} samples were compared"]
+    elif not any(stats.results for stats in error_stats.values()):
         verdict, reasons = ValidationVerdict.NOT_VERIFIED, ["nothing was compared"]
     return (ValidationVerdict.DISAGREES if disagreements else verdict), disagreements + reasons
 
 
-def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
-    failed = sum(tally.failed for tally in tallies.values())
+def _outside(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
+    failed = sum(stats.failed for stats in error_stats.values())
     if failed:
-        results = sum(tally.results for tally in tallies.values())
+        results = sum(stats.results for stats in error_stats.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(plus, (tally.cross_check for tally in tallies.values()), None)
+    found = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
     if found is not None and found.urdfkin.failed:
         ours, theirs, second_oracle = found.alone
         title = ORACLES[found.by].title

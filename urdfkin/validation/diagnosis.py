@@ -27,14 +27,14 @@ if TYPE_CHECKING:
     from urdfkin.verify.quantities import Quantity
 
 #: Largest remainder (see `Diagnosis.remainder`) at which a mistake explains the results.
-EXPLAINED = 1e-3
-_MOST = 3
+EXPLANATION_TOLERANCE = 1e-3
+_MAX_MISTAKES = 3
 #: Number of configurations in a first, fast test for two exchanged joints.
-_FEW = 4
-#: Each difference is divided by its scale. The smallest scale is _LEAST * (largest scale).
-_LEAST = 1e-9
-#: Two numbers count as equal if their difference is at most _EQUAL * scale.
-_EQUAL = 1e-9
+_FIRST_SAMPLES = 4
+#: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
+_MIN_SCALE = 1e-9
+#: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
+_EQUALITY_TOLERANCE = 1e-9
 #: Row indices that exchange the linear and the angular rows of a six-vector.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
@@ -54,27 +54,27 @@ class Diagnosis:
     """
 
     inputs: Inputs
-    found: FloatArray
+    actual: FloatArray
     expected: FloatArray
     scale: FloatArray
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the largest difference of `found` from `predicted`, divided by that from `expected`.
+        """Return the largest difference of `actual` from `predicted`, divided by that from `expected`.
 
         `predicted` contains urdfkin's results with a mistake: the first n results, or all if n is None.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
-            whole = float((np.abs(self.found[:n] - self.expected[:n]) / scale).max())
-            left = float((np.abs(self.found[:n] - predicted) / scale).max())
+            whole = float((np.abs(self.actual[:n] - self.expected[:n]) / scale).max())
+            left = float((np.abs(self.actual[:n] - predicted) / scale).max())
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
+        return bool((np.abs(predicted - self.expected) <= _EQUALITY_TOLERANCE * self._nonzero_scale()).all())
 
     def _nonzero_scale(self, n: int | None = None) -> FloatArray:
-        scale: FloatArray = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        scale: FloatArray = np.maximum(self.scale[:n], _MIN_SCALE * self.scale[:n].max(initial=_MIN_SCALE))
         return scale
 
     def first(self, n: int) -> Inputs:
@@ -84,24 +84,24 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results."""
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
-    swaps = mistakes.exchanged_halves
+    swaps = mistakes.halves_mistake
     if swaps:
-        single.append((case.remainder(case.expected[:, _HALVES]), f"{swaps}; {mistakes.expected_halves}"))
+        single.append((case.remainder(case.expected[:, _HALVES]), f"{swaps}; {mistakes.halves_convention}"))
     for words, predict in mistakes.all(case):
         try:
             predicted = predict()
         except UrdfkinError:  # This robot cannot have the mistake.
             continue
-        if predicted.shape != case.found.shape or case.is_expected(predicted):
+        if predicted.shape != case.actual.shape or case.is_expected(predicted):
             continue
         single.append((case.remainder(predicted), words))
         if swaps:
             double.append((case.remainder(predicted[:, _HALVES]), f"{words}, and {swaps}"))
     for found in (single, list(_columns(mistakes, case)), double):
         best = min((rest for rest, _ in found), default=np.inf)
-        if best <= EXPLAINED:
-            most = min(EXPLAINED, 100.0 * best + 1e-12)
-            return [words for rest, words in found if rest <= most][:_MOST]
+        if best <= EXPLANATION_TOLERANCE:
+            most = min(EXPLANATION_TOLERANCE, 100.0 * best + 1e-12)
+            return [words for rest, words in found if rest <= most][:_MAX_MISTAKES]
     return []
 
 
@@ -120,12 +120,12 @@ class Mistakes:
     conversion: Conversion | None
 
     @property
-    def exchanged_halves(self) -> str:
+    def halves_mistake(self) -> str:
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
     @property
-    def expected_halves(self) -> str:
+    def halves_convention(self) -> str:
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -163,48 +163,50 @@ class Mistakes:
         q, v, a = case.inputs
         linear, angular = self._linear(), self._angular()
 
-        def spatial() -> FloatArray:
+        def compute_spatial() -> FloatArray:
             velocity = self._velocity(q, v)
             found = case.expected.copy()
             found[:, linear] -= np.cross(velocity[:, angular], velocity[:, linear])
             return found
 
-        def weighed(sign: float) -> FloatArray:
+        def add_gravity(sign: float) -> FloatArray:
             found = case.expected.copy()
             down = np.array([0.0, 0.0, sign * _G])
             if self.reference is Reference.LOCAL:
-                R = self.robot.placement(self._ours(case.inputs)[0], self.frame, verify=False)[:, :3, :3]
+                R = self.robot.placement(self._native_inputs(case.inputs)[0], self.frame, verify=False)[
+                    :, :3, :3
+                ]
                 found[:, linear] += np.einsum("nji,j->ni", R, down)
             else:
                 found[:, linear] += down
             return found
 
-        yield "the spatial acceleration was computed; the classical one adds w x v", spatial
+        yield "the spatial acceleration was computed; the classical one adds w x v", compute_spatial
         for sign, words in ((1.0, "upwards"), (-1.0, "downwards")):
-            yield f"gravity ({_G} m/s^2 {words}) is included", partial(weighed, sign)
+            yield f"gravity ({_G} m/s^2 {words}) is included", partial(add_gravity, sign)
         zero = np.zeros_like(v)
         yield "the term J' v is missing", partial(case.compute, (q, zero, a))
         yield "the term J a is missing", partial(case.compute, (q, v, zero))
 
     def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        q, v = self._ours((q, v))
+        q, v = self._native_inputs((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
         return found if self.conversion is None else self.conversion.reorder_six_vector(found)
 
-    def _ours(self, inputs: Inputs) -> Inputs:
+    def _native_inputs(self, inputs: Inputs) -> Inputs:
         return inputs if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
     def _of_placements(self, case: Diagnosis) -> Iterator[Mistake]:
         yield "the placement is inverted", partial(np.asarray, np.linalg.inv(case.expected))
 
-        def turned() -> FloatArray:
+        def transpose_rotation() -> FloatArray:
             found = case.expected.copy()
             found[:, :3, :3] = found[:, :3, :3].swapaxes(1, 2)
             return found
 
-        yield "the rotation is transposed", turned
-        q = self._ours(case.inputs)[0]
+        yield "the rotation is transposed", transpose_rotation
+        q = self._native_inputs(case.inputs)[0]
         for link in self.robot.link_names[:64]:
             base = self.robot.placement(q, f"link:{link}", verify=False)
             if not np.allclose(base, np.eye(4)):
@@ -238,10 +240,10 @@ class Mistakes:
             (np.radians(1.0), "the function takes q in degrees"),
             (np.degrees(1.0), "the function multiplies q by 180/pi, although q must be in radians"),
         ):
-            yield words, partial(case.compute, self._scaled(case.inputs, turns, factor, 1))
+            yield words, partial(case.compute, self._scale_joints(case.inputs, turns, factor, 1))
             if len(case.inputs) > 1:
                 all_inputs = " q, v and a " if len(case.inputs) == 3 else " q and v "
-                everywhere = self._scaled(case.inputs, turns, factor, 3)
+                everywhere = self._scale_joints(case.inputs, turns, factor, 3)
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
@@ -263,7 +265,7 @@ class Mistakes:
         return found
 
     @staticmethod
-    def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
+    def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
         """Multiply joint entries of the first `count` inputs by a factor.
 
         `at` contains the index in q and the index in v of each joint.
@@ -288,13 +290,13 @@ class Mistakes:
 
         def expand(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
             names = free.coordinate_names if letter == "q" else free.velocity_names
-            ours = self.robot.coordinate_names if letter == "q" else self.robot.velocity_names
+            own_names = self.robot.coordinate_names if letter == "q" else self.robot.velocity_names
             found = np.zeros((len(x), len(names)))
-            found[:, [names.index(name) for name in ours]] = x
+            found[:, [names.index(name) for name in own_names]] = x
             for joint in mimics if moving else ():
                 assert joint.mimic is not None
                 rule = joint.mimic
-                value = rule.multiplier * x[:, ours.index(rule.leader)]
+                value = rule.multiplier * x[:, own_names.index(rule.leader)]
                 found[:, names.index(joint.name)] = value + (rule.offset if letter == "q" else 0.0)
             return found
 
@@ -323,7 +325,7 @@ class Mistakes:
         axes = self._axes()
         for name, q, v, _ in axes:
             words = f"the joint {name!r} has the opposite sign"
-            flipped = self._scaled(case.inputs, [(q, v)], -1.0, 3)
+            flipped = self._scale_joints(case.inputs, [(q, v)], -1.0, 3)
             if self.row.columns:
                 sign = np.ones(case.expected.shape[-1])
                 sign[v] = -1.0
@@ -332,11 +334,11 @@ class Mistakes:
             else:
                 yield words, partial(case.compute, flipped)
                 if len(case.inputs) > 1:
-                    only = self._scaled(case.inputs, [(q, v)], -1.0, 1)
+                    only = self._scale_joints(case.inputs, [(q, v)], -1.0, 1)
                     yield f"{words} in q only", partial(case.compute, only)
         for (one, *at), (other, *to) in combinations(((name, q, v) for name, q, v, _ in axes), 2):
             words = f"the joints {one!r} and {other!r} are exchanged"
-            few = self._exchanged(case.first(_FEW), tuple(at), tuple(to))
+            few = self._exchange_joints(case.first(_FIRST_SAMPLES), tuple(at), tuple(to))
             variants = (
                 ((words, True), (f"{words} in q only", False)) if self.row.columns else ((words, False),)
             )
@@ -345,8 +347,8 @@ class Mistakes:
                 if columns:
                     order[[at[1], to[1]]] = order[[to[1], at[1]]]
                 predicted = self._columns_in(case, few, order)
-                if case.remainder(predicted, _FEW) <= EXPLAINED:
-                    every = self._exchanged(case.inputs, tuple(at), tuple(to))
+                if case.remainder(predicted, _FIRST_SAMPLES) <= EXPLANATION_TOLERANCE:
+                    every = self._exchange_joints(case.inputs, tuple(at), tuple(to))
                     yield sentence, partial(self._columns_in, case, every, order)
 
     def _columns_times(self, case: Diagnosis, inputs: Inputs, sign: FloatArray) -> FloatArray:
@@ -361,7 +363,7 @@ class Mistakes:
         return found[..., order, :] if len(self.row.shape) == 3 else found
 
     @staticmethod
-    def _exchanged(inputs: Inputs, one: tuple[int, ...], other: tuple[int, ...]) -> Inputs:
+    def _exchange_joints(inputs: Inputs, one: tuple[int, ...], other: tuple[int, ...]) -> Inputs:
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found):
             at = [one[min(k, 1)], other[min(k, 1)]]
@@ -412,19 +414,21 @@ def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names
-    ours, theirs = case.expected, case.found
+    expected, actual = case.expected, case.actual
     size = np.maximum(case.scale, np.finfo(float).tiny)
 
     def equal(i: int, x: FloatArray) -> bool:
-        return bool((np.abs(theirs[..., i] - x) <= _EQUAL * size[..., i]).all())
+        return bool((np.abs(actual[..., i] - x) <= _EQUALITY_TOLERANCE * size[..., i]).all())
 
-    wrong = [i for i in range(ours.shape[-1]) if not equal(i, ours[..., i])]
+    wrong = [i for i in range(expected.shape[-1]) if not equal(i, expected[..., i])]
     for i in wrong:
-        if equal(i, -ours[..., i]):
+        if equal(i, -expected[..., i]):
             yield 0.0, f"the column of {names[i]!r} has the opposite sign"
-        elif equal(i, np.zeros_like(ours[..., i])):
+        elif equal(i, np.zeros_like(expected[..., i])):
             yield 0.0, f"the column of {names[i]!r} is zero"
         else:
-            other = next((k for k in range(ours.shape[-1]) if k != i and equal(i, ours[..., k])), None)
+            other = next(
+                (k for k in range(expected.shape[-1]) if k != i and equal(i, expected[..., k])), None
+            )
             if other is not None:
                 yield 0.0, f"the column of {names[i]!r} is that of {names[other]!r}"

@@ -74,7 +74,7 @@ class ReportedJoint(TypedDict):
     v: Annotated[int | None, says("Index of the joint's first entry in v and in a; null: none.")]
     limit: Annotated[ReportedLimit | None, says("The joint's limits; null: the joint has no limits.")]
     mimic: Annotated[ReportedMimic | None, says("The rule of a mimic joint; null for other joints.")]
-    kept: Annotated[
+    remaining_range: Annotated[
         ReportedRange | None,
         says(
             "The part of the joint's range in which all its mimic joints are within their limits."
@@ -184,7 +184,7 @@ class Chain(TypedDict):
             " entry covers both tables. null: a result is NaN, or there is no comparison."
         ),
     ]
-    share_of_bound: Annotated[
+    bound_ratio: Annotated[
         float | None,
         says(
             "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
@@ -244,7 +244,7 @@ class ReportedOraclePair(TypedDict):
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
-    share_of_bound: BoundRatio
+    bound_ratio: BoundRatio
 
 
 class Alone(TypedDict):
@@ -283,7 +283,7 @@ class ReportedCheck(TypedDict):
     median: Units
     p99: Units
     worst: Units
-    share_of_bound: BoundRatio
+    bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
         says("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
@@ -393,7 +393,9 @@ class Document(Header):
     seed: Annotated[int, says("Seed of the random samples.")]
     samples: Annotated[Count, says("Number of random configurations for each robot.")]
     histogram_edges: Annotated[list[float], says("Edges of the bins of all histograms, in eps * scale.")]
-    asked: Annotated[Count, says("Number of robots in the validation, including those without a report.")]
+    robots_requested: Annotated[
+        Count, says("Number of robots in the validation, including those without a report.")
+    ]
     interrupted: Annotated[bool, says("Whether the validation ended early, or its store is incomplete.")]
     reason: Annotated[str | None, says("One-line reason why the validation has not passed; null: passed.")]
     robots: Annotated[list[ReportedRobot], says("Reports of the robots in the requested order.")]
@@ -452,23 +454,23 @@ class RunOutcome:
         return self.reason is None
 
 
-def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> RunOutcome:
-    """Return the outcome of a run with `asked` requested robots.
+def outcome(verdicts: Iterable[str], robots_requested: int, interrupted: bool) -> RunOutcome:
+    """Return the outcome of a run with `robots_requested` requested robots.
 
-    >>> outcome(["bad input", "bad input"], asked=3, interrupted=False).reason
+    >>> outcome(["bad input", "bad input"], robots_requested=3, interrupted=False).reason
     '2 of 3 robots have bad input, 1 of 3 robots without a report'
     """
     counts = Counter(map(str, verdicts))
-    robots = "1 robot" if asked == 1 else f"{asked:,} robots"
+    robots = "1 robot" if robots_requested == 1 else f"{robots_requested:,} robots"
     reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
         f"{counts[verdict]} of {robots} {words[counts[verdict] > 1]}"
         for verdict, words in _WORDS.items()
         if counts[verdict]
     ]
-    if missing := asked - counts.total():
+    if missing := robots_requested - counts.total():
         reasons.append(f"{missing} of {robots} without a report")
-    if not asked:
+    if not robots_requested:
         reasons.append("no robot was validated")
     return RunOutcome(_exit_code(counts, interrupted, bool(reasons)), ", ".join(reasons) or None)
 
@@ -494,4 +496,4 @@ VALIDATION = DocumentKind(
 
 def outcome_of(document: Document) -> RunOutcome:
     verdicts = [robot["verdict"] for robot in document["robots"]]
-    return outcome(verdicts, document["asked"], document["interrupted"])
+    return outcome(verdicts, document["robots_requested"], document["interrupted"])

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Protocol
 
-from urdfkin.validation.answer import Answer, Failure, answer, lost_failure
+from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
 #: Maximum number of chunks in an executor's queue: enough for many workers, and few enough to save memory.
@@ -33,22 +33,22 @@ class Task:
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
 #: Callback that receives the answer of a task, at most once for each task.
-Enter = Callable[[Task, Answer], None]
+AnswerCallback = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
     """Interface of an engine; an exception from `run` ends the validation, but earlier answers are kept."""
 
-    def run(self, work: Work, enter: Enter) -> None: ...
+    def run(self, work: Work, on_answer: AnswerCallback) -> None: ...
 
 
 class SerialEngine:
-    def run(self, work: Work, enter: Enter) -> None:
+    def run(self, work: Work, on_answer: AnswerCallback) -> None:
         for tasks in work:
             for task in tasks:
-                found = answer(task.chunk)
-                enter(task, found)
-                if isinstance(found, Failure):
+                answer = answer_chunk(task.chunk)
+                on_answer(task, answer)
+                if isinstance(answer, Failure):
                     break
 
 
@@ -56,35 +56,35 @@ class ExecutorEngine:
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
 
-    def run(self, work: Work, enter: Enter) -> None:
+    def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks; an error that the executor raises becomes the result of the robot."""
         waiting, failed = chain.from_iterable(work), set[int]()
         submitted = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)
         try:
             while next_task is not None or submitted:
-                found: Answer | None
+                answer: Answer | None
                 if next_task is not None and len(submitted) < IN_FLIGHT:
                     task, next_task = next_task, next(waiting, None)
                     if task.robot in failed:
                         continue
-                    found = self._submit(task, submitted)
+                    answer = self._submit(task, submitted)
                 else:
                     task, future = submitted.popleft()
-                    found = _result(future)
-                if isinstance(found, Failure):
+                    answer = _result(future)
+                if isinstance(answer, Failure):
                     failed.add(task.robot)
-                if found is not None:
-                    enter(task, found)
+                if answer is not None:
+                    on_answer(task, answer)
         finally:
             for _, future in submitted:
                 future.cancel()
 
     def _submit(self, task: Task, submitted: deque[tuple[Task, Future[Answer]]]) -> Failure | None:
         try:
-            submitted.append((task, self._executor.submit(answer, task.chunk)))
+            submitted.append((task, self._executor.submit(answer_chunk, task.chunk)))
         except Exception as error:
-            return lost_failure("the executor did not accept the chunk", error)
+            return make_lost_failure("the executor did not accept the chunk", error)
         return None
 
 
@@ -92,7 +92,7 @@ def _result(future: Future[Answer]) -> Answer:
     try:
         return future.result()
     except Exception as error:
-        return lost_failure("the executor lost the chunk", error)
+        return make_lost_failure("the executor lost the chunk", error)
 
 
 class RobotTasks:
@@ -120,8 +120,8 @@ class WorkQueue:
     def __init__(self, work: Work, *, shared: bool = True) -> None:
         self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
         self._shared = shared
-        self._begun: list[RobotTasks] = []
-        self._ended = set[int]()
+        self._started_robots: list[RobotTasks] = []
+        self._removed_robots = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
         """Return a task for an idle worker, and the remaining tasks of the same robot.
@@ -129,10 +129,10 @@ class WorkQueue:
         New robots come first.
         """
         for tasks in self._waiting:
-            self._begun.append(tasks)
+            self._started_robots.append(tasks)
             if (task := self.next(tasks)) is not None:
                 return task, tasks
-        for tasks in sorted(self._begun, key=lambda tasks: tasks.index) if self._shared else ():
+        for tasks in sorted(self._started_robots, key=lambda tasks: tasks.index) if self._shared else ():
             if (task := self.next(tasks)) is not None:
                 return task, tasks
         return None
@@ -140,20 +140,20 @@ class WorkQueue:
     def next(self, tasks: RobotTasks) -> Task | None:
         """Return the next task of a robot; None if no task is left, or if the robot was removed."""
         task = next(tasks, None)
-        if task is None or task.robot in self._ended:
-            if tasks in self._begun:
-                self._begun.remove(tasks)
+        if task is None or task.robot in self._removed_robots:
+            if tasks in self._started_robots:
+                self._started_robots.remove(tasks)
             return None
         return task
 
     def put_back(self, task: Task, tasks: RobotTasks) -> None:
         tasks.put_back(task)
-        self._begun.remove(tasks)
+        self._started_robots.remove(tasks)
         self._waiting = chain([tasks], self._waiting)
 
-    def end(self, robot: int) -> None:
-        self._ended.add(robot)
+    def remove(self, robot: int) -> None:
+        self._removed_robots.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
-        self.end(robot)
-        return [task for tasks in self._begun if tasks.robot == robot for task in tasks]
+        self.remove(robot)
+        return [task for tasks in self._started_robots if tasks.robot == robot for task in tasks]

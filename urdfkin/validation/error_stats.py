@@ -1,8 +1,8 @@
 """Error statistics of a validation.
 
-The statistics of several chunks, processes and machines can be added. The addition of tallies is commutative
+The statistics of several chunks, processes and machines can be added. The addition is commutative
 and associative. Therefore, the sum does not depend on the division of the samples into chunks. If two worst
-cases are equally bad, the sum of two tallies keeps the case with the smaller sample number.
+cases are equally bad, the sum keeps the case with the smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
@@ -33,13 +33,13 @@ class OraclePair:
 
     failed: int = 0
     worst: float = 0.0
-    share_of_bound: float = 0.0
+    bound_ratio: float = 0.0
 
     def __add__(self, other: OraclePair) -> OraclePair:
         return OraclePair(
             self.failed + other.failed,
             max(self.worst, other.worst),
-            max(self.share_of_bound, other.share_of_bound),
+            max(self.bound_ratio, other.bound_ratio),
         )
 
 
@@ -73,29 +73,38 @@ class CrossCheck:
         return asdict(self) | {"alone": dict(zip(CROSS_CHECKED, self.alone, strict=True))}
 
 
-def plus(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
+def add_cross_checks(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
     return first if second is None else second if first is None else first + second
 
 
-def cross_check(
-    by: str, ours: FloatArray, pinocchios: FloatArray, second_oracles: FloatArray, first: Bound, second: Bound
+def make_cross_check(
+    by: str,
+    results: FloatArray,
+    pinocchio_results: FloatArray,
+    second_oracle_results: FloatArray,
+    first: Bound,
+    second: Bound,
 ) -> CrossCheck:
     """Compare three results (n, frames, ...) with each other.
 
     `first` is the bound on the difference between urdfkin and Pinocchio. `second` is the bound on the
     difference between urdfkin and the second oracle.
     """
-    if not ours.size:
+    if not results.size:
         return CrossCheck(by, OraclePair(), OraclePair())
-    ours_pinocchio, _ = _compare_pair(ours, pinocchios, first)
-    ours_second, urdfkin = _compare_pair(ours, second_oracles, second)
-    pinocchio_second, pinocchio = _compare_pair(pinocchios, second_oracles, _sum_of_bounds(first, second))
-    alone = (
-        pinocchio_second & ~ours_pinocchio & ~ours_second,
-        ours_second & ~ours_pinocchio & ~pinocchio_second,
-        ours_pinocchio & ~ours_second & ~pinocchio_second,
+    agrees_with_pinocchio, _ = _compare_pair(results, pinocchio_results, first)
+    agrees_with_second, urdfkin = _compare_pair(results, second_oracle_results, second)
+    pinocchio_agrees_with_second, pinocchio = _compare_pair(
+        pinocchio_results, second_oracle_results, _sum_of_bounds(first, second)
     )
-    settled = np.logical_or.reduce((*alone, ours_pinocchio & ours_second & pinocchio_second))
+    alone = (
+        pinocchio_agrees_with_second & ~agrees_with_pinocchio & ~agrees_with_second,
+        agrees_with_second & ~agrees_with_pinocchio & ~pinocchio_agrees_with_second,
+        agrees_with_pinocchio & ~agrees_with_second & ~pinocchio_agrees_with_second,
+    )
+    settled = np.logical_or.reduce(
+        (*alone, agrees_with_pinocchio & agrees_with_second & pinocchio_agrees_with_second)
+    )
     first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
     counts = first_alone, second_alone, third_alone
     return CrossCheck(by, urdfkin, pinocchio, counts, int((~settled).sum()))
@@ -103,9 +112,9 @@ def cross_check(
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
     units = worst_of_each(one, other, bound.scale, 2)
-    share = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
-    agrees = share <= 1.0
-    return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(share.max()))
+    bound_ratio = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
+    agrees = bound_ratio <= 1.0
+    return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(bound_ratio.max()))
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
@@ -124,9 +133,12 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """Sample with the largest `share` (disagreement / bound); `units` is the disagreement in eps * scale."""
+    """Sample with the largest `bound_ratio` (disagreement / bound).
 
-    share: float
+    `units` is the disagreement in eps * scale.
+    """
+
+    bound_ratio: float
     units: float
     sample: int
     frame: str
@@ -136,47 +148,47 @@ class WorstCase:
 
 
 @dataclass(frozen=True, slots=True)
-class Tally:
+class ErrorStats:
     """Error statistics of one quantity in one reference frame.
 
     Attributes:
         results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
-        share: The largest ratio of a disagreement to its bound.
+        bound_ratio: The largest ratio of a disagreement to its bound.
         histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
             adjacent edges, and above the last edge.
-        by_frame: The largest disagreement of each frame, in the robot's order.
+        worst_by_frame: The largest disagreement of each frame, in the robot's order.
         bounds: The smallest and the largest bound of all results, in eps * scale.
     """
 
     results: int
     failed: int
     worst: float
-    share: float
+    bound_ratio: float
     histogram: tuple[int, ...]
-    by_frame: tuple[float, ...]
+    worst_by_frame: tuple[float, ...]
     case: WorstCase | None
     bounds: tuple[float, float] = (math.inf, 0.0)
     cross_check: CrossCheck | None = None
 
-    def __add__(self, other: Tally) -> Tally:
+    def __add__(self, other: ErrorStats) -> ErrorStats:
         cases = [case for case in (self.case, other.case) if case is not None]
-        return Tally(
+        return ErrorStats(
             self.results + other.results,
             self.failed + other.failed,
             max(self.worst, other.worst),
-            max(self.share, other.share),
+            max(self.bound_ratio, other.bound_ratio),
             tuple(a + b for a, b in zip(self.histogram, other.histogram, strict=True)),
-            tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
-            max(cases, key=lambda case: (case.share, -case.sample), default=None),
+            tuple(max(a, b) for a, b in zip(self.worst_by_frame, other.worst_by_frame, strict=True)),
+            max(cases, key=lambda case: (case.bound_ratio, -case.sample), default=None),
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
-            plus(self.cross_check, other.cross_check),
+            add_cross_checks(self.cross_check, other.cross_check),
         )
 
-    def beside(self, other: Tally) -> Tally:
+    def join_frames(self, other: ErrorStats) -> ErrorStats:
         """Return the statistics for all frames of `self` and `other`; both must have the same samples."""
-        joined = replace(self, by_frame=()) + replace(other, by_frame=())
-        return replace(joined, by_frame=self.by_frame + other.by_frame)
+        joined = replace(self, worst_by_frame=()) + replace(other, worst_by_frame=())
+        return replace(joined, worst_by_frame=self.worst_by_frame + other.worst_by_frame)
 
     def percentile(self, percent: float) -> float:
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
@@ -197,34 +209,42 @@ def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
     return int(np.searchsorted(edges, units, side="right"))
 
 
-def tally(
-    ours: FloatArray,
-    theirs: FloatArray,
+def compute_error_stats(
+    results: FloatArray,
+    oracle_results: FloatArray,
     bound: Bound,
     frames: tuple[str, ...],
     first_sample: int,
     inputs: Sequence[Inputs],
-) -> Tally:
+) -> ErrorStats:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample."""
-    n, count = ours.shape[:2]
-    if not ours.size:
-        return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)
-    units = worst_of_each(ours, theirs, bound.scale, 2)
-    share = units / result_k(bound, units.shape)
-    k, f = divmod(int(share.argmax()), count)
+    n, count = results.shape[:2]
+    if not results.size:
+        return ErrorStats(
+            n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None
+        )
+    units = worst_of_each(results, oracle_results, bound.scale, 2)
+    bound_ratio = units / result_k(bound, units.shape)
+    k, f = divmod(int(bound_ratio.argmax()), count)
     q, v, a = inputs[k]
     case = WorstCase(
-        float(share[k, f]), float(units[k, f]), first_sample + k, frames[f], tuple(q), tuple(v), tuple(a)
+        float(bound_ratio[k, f]),
+        float(units[k, f]),
+        first_sample + k,
+        frames[f],
+        tuple(q),
+        tuple(v),
+        tuple(a),
     )
     bins = np.searchsorted(HISTOGRAM_EDGES, units.ravel(), side="right")
     histogram = np.bincount(bins, minlength=len(HISTOGRAM_EDGES) + 1)
-    return Tally(
+    return ErrorStats(
         results=n * count,
-        failed=int((share > 1.0).sum()),
+        failed=int((bound_ratio > 1.0).sum()),
         worst=float(units.max()),
-        share=float(share.max()),
+        bound_ratio=float(bound_ratio.max()),
         histogram=tuple(int(x) for x in histogram),
-        by_frame=tuple(float(x) for x in units.max(axis=0)),
+        worst_by_frame=tuple(float(x) for x in units.max(axis=0)),
         case=case,
         bounds=(float(bound.k.min()), float(bound.k.max())),
     )

@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-_BATCH = 256
+_BATCH_SIZE = 256
 #: Number of configurations in a diagnosis.
-_DIAGNOSED = 48
+_DIAGNOSIS_SAMPLES = 48
 #: Maximum number of stored messages about exceptions and wrong shapes.
-_MESSAGES = 5
+_MAX_MESSAGES = 5
 #: Rounding to single precision can explain relative differences up to this value.
-_SINGLE = 1e-5
+_SINGLE_PRECISION = 1e-5
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class WorstResult:
 
     sample: int
     inputs: tuple[FloatArray, ...]
-    found: FloatArray
+    actual: FloatArray
     expected: FloatArray
     bound: FloatArray
     replay: str
@@ -79,12 +79,12 @@ class WorstResult:
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
         """Return a sentence about the number with the largest ratio of difference to bound."""
         with np.errstate(all="ignore"):
-            over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
+            over = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
         at = tuple(int(i) for i in np.unravel_index(flat, over.shape))
         names = [rows[at[0]], *(columns[k] if columns else f"column {k}" for k in at[1:])]
         return (
-            f"The number {', '.join(names)} is {self.found[at]:.17g}; {self.expected[at]:.17g} was expected,"
+            f"The number {', '.join(names)} is {self.actual[at]:.17g}; {self.expected[at]:.17g} was expected,"
             f" within {self.bound[at]:.2g}."
         )
 
@@ -106,9 +106,9 @@ class FunctionCheck(Displayable):
         compared: Number of results that have the right shape.
         factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
-        share: Largest value of difference / (bound * factor); at most 1 if all results agree.
-        oracle_share: Largest value of difference / (bound * factor), where the difference is between the
-            function and the oracle. None without an oracle.
+        bound_ratio: Largest value of difference / (bound * factor); at most 1 if all results agree.
+        oracle_bound_ratio: Largest value of difference / (bound * factor), where the difference is between
+            the function and the oracle. None without an oracle.
         rows: Largest ratio in each row of the result; the key is the name of the row.
         columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
             for other quantities.
@@ -136,8 +136,8 @@ class FunctionCheck(Displayable):
     compared: int
     factor: float
     eps_scale: float
-    share: float
-    oracle_share: float | None
+    bound_ratio: float
+    oracle_bound_ratio: float | None
     rows: dict[str, float]
     columns: dict[str, float]
     worst: WorstResult | None
@@ -154,21 +154,21 @@ class FunctionCheck(Displayable):
         >>> urdfkin.verify_function(lambda q: arm.jacobian(q, "tip"), arm, samples=5).agrees
         True
         """
-        good = self.compared == self.samples and not self.errors and self.share <= 1.0
-        return good and (self.oracle_share is None or self.oracle_share <= 1.0)
+        good = self.compared == self.samples and not self.errors and self.bound_ratio <= 1.0
+        return good and (self.oracle_bound_ratio is None or self.oracle_bound_ratio <= 1.0)
 
     @property
-    def needed_factor(self) -> float:
+    def smallest_factor(self) -> float:
         """The smallest `factor` with which all compared results agree with urdfkin's.
 
         >>> import urdfkin
         >>> import numpy as np
         >>> arm = urdfkin.load("planar_two_link")
         >>> single = lambda q: arm.jacobian(q, "tip").astype(np.float32)
-        >>> urdfkin.verify_function(single, arm, samples=5).needed_factor > 1.0
+        >>> urdfkin.verify_function(single, arm, samples=5).smallest_factor > 1.0
         True
         """
-        return self.share * self.factor
+        return self.bound_ratio * self.factor
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data for JSON; a value that is not finite becomes null.
@@ -190,27 +190,28 @@ class FunctionCheck(Displayable):
         ]
         if self.compared:
             parts.append(
-                f"Largest difference from urdfkin: {self.eps_scale:.3g} eps*scale, {self.share:.3g} of the"
-                f" allowed difference (the bound times {self.factor:g})."
+                f"Largest difference from urdfkin: {self.eps_scale:.3g} eps*scale, {self.bound_ratio:.3g}"
+                f" of the allowed difference (the bound times {self.factor:g})."
             )
-        if self.oracle_share is None:
+        if self.oracle_bound_ratio is None:
             parts.append("urdfkin's results were NOT checked: no oracle can check this robot.")
         elif self.compared:
             parts.append(
-                f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the allowed difference."
+                f"Largest difference from {self.oracle}: {self.oracle_bound_ratio:.3g} of the allowed"
+                " difference."
             )
         if self.errors:
             parts.append(f"{self.errors} configurations without a result of the right shape:")
             parts += [f"  sample {error.sample}: {error.message}" for error in self.first_errors]
         if not self.agrees and self.compared:
             parts += [f"Diagnosis: {words}." for words in self.diagnoses]
-            parts += self._parts_of_the_worst()
+            parts += self._describe_worst()
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
-    def _parts_of_the_worst(self) -> Iterator[str | Table]:
-        for title, shares in (("row", self.rows), ("column", self.columns)):
-            wrong = [(name, f"{share:.3g}") for name, share in shares.items() if not share <= 1.0]
-            if wrong and len(wrong) < len(shares):
+    def _describe_worst(self) -> Iterator[str | Table]:
+        for title, ratios in (("row", self.rows), ("column", self.columns)):
+            wrong = [(name, f"{ratio:.3g}") for name, ratio in ratios.items() if not ratio <= 1.0]
+            if wrong and len(wrong) < len(ratios):
                 yield Table((title, "of the bound"), wrong)
             elif wrong:
                 yield f"Every {title} differs."
@@ -272,7 +273,7 @@ def verify_function(
         seed: Seed of the random configurations.
         factor: Number by which the bound is multiplied. The bound is derived for a recursion from joint to
             joint; give a factor above 1 for a method with larger rounding errors.
-            `FunctionCheck.needed_factor` is the smallest factor with which the check passes.
+            `FunctionCheck.smallest_factor` is the smallest factor with which the check passes.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
@@ -326,8 +327,8 @@ class _FunctionResults:
     """The results of the user's function and of urdfkin for a batch of configurations.
 
     Attributes:
-        good: Indices of the n configurations with a result of the right shape.
-        found: The function's results (n, ...).
+        valid_indices: Indices of the n configurations with a result of the right shape.
+        actual: The function's results (n, ...).
         expected: urdfkin's results (n, ...).
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
         k: (n,) for each result, the factor k in its bound k * eps * scale.
@@ -335,19 +336,19 @@ class _FunctionResults:
 
     first: int
     inputs: tuple[FloatArray, ...]
-    good: list[int]
-    found: FloatArray
+    valid_indices: list[int]
+    actual: FloatArray
     expected: FloatArray
     scale: FloatArray
     k: FloatArray
-    theirs: FloatArray | None
+    oracle_results: FloatArray | None
 
-    def shares(self, other: FloatArray) -> FloatArray:
-        k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
+    def bound_ratios(self, other: FloatArray) -> FloatArray:
+        k = self.k.reshape(-1, *[1] * (self.actual.ndim - 1))
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        return disagreement(self.found, other, self.scale)
+        return disagreement(self.actual, other, self.scale)
 
 
 @dataclass
@@ -373,19 +374,19 @@ class _Run:
         drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
-        for first in range(0, len(drawn.q), _BATCH):
-            part = slice(first, first + _BATCH)
-            total.add(self._compared(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
+        for first in range(0, len(drawn.q), _BATCH_SIZE):
+            part = slice(first, first + _BATCH_SIZE)
+            total.add(self._compare(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
         return self._result(total, len(drawn.q), checked)
 
     def _result(self, total: _Total, samples: int, checked: bool) -> FunctionCheck:
         robot = self.robot
         diagnoses: tuple[str, ...] = ()
-        if total.share > 1.0 or total.errors:
+        if total.bound_ratio > 1.0 or total.errors:
             diagnoses = tuple(self._diagnoses(total))
         worst = total.worst
         if worst is not None:
-            values = self._ours(worst.inputs)
+            values = self._native_inputs(worst.inputs)
             worst = replace(worst, replay=self._replay(values))
         return FunctionCheck(
             getattr(self.function, "__name__", type(self.function).__name__),
@@ -399,8 +400,8 @@ class _Run:
             total.compared,
             self.factor,
             total.eps_scale,
-            total.share,
-            total.oracle_share if checked else None,
+            total.bound_ratio,
+            total.oracle_bound_ratio if checked else None,
             dict(zip(total.row_names, total.by_row.tolist(), strict=True)),
             dict(zip(total.column_names, total.by_column.tolist(), strict=True)),
             worst,
@@ -411,51 +412,55 @@ class _Run:
 
     # -- the two results -----------------------------------------------------------------------------
 
-    def expected(
+    def compute_expected(
         self,
         inputs: Sequence[FloatArray],
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
         """Return urdfkin's results for inputs in the function's convention, without a check."""
-        ours = self._ours(inputs)
+        native_inputs = self._native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
-            found = self._method(self.robot, ours, frame or self.frame, reference, verify=False)
-            return self._converted(ours, found, frame, reference)
+            found = self._method(self.robot, native_inputs, frame or self.frame, reference, verify=False)
+            return self._convert(native_inputs, found, frame, reference)
 
-    def _compared(
+    def _compare(
         self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool
     ) -> _FunctionResults:
         row = self.row
-        ours = drawn[: len(row.inputs)]
-        result = self._method(self.recording, ours, self.frame, None, verify=checked)
+        native_inputs = drawn[: len(row.inputs)]
+        result = self._method(self.recording, native_inputs, self.frame, None, verify=checked)
         call = self.recorder.calls[row.name]
         flat = result[:, None]
         part = call.part(slice(0, call.n))
-        theirs, bound = None, None
+        oracle_results, bound = None, None
         if checked:
             oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.library)
-            theirs, bound = oracle_results_with_bound(row, oracle, part, flat, self.robot.verifier.library)
+            oracle_results, bound = oracle_results_with_bound(
+                row, oracle, part, flat, self.robot.verifier.library
+            )
         else:
             bound = bound_of(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
         k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
-        inputs: tuple[FloatArray, ...] = ours
+        inputs: tuple[FloatArray, ...] = native_inputs
         if self.conversion is not None:
-            inputs = as_tuple(self.conversion.to(*ours))
-            scale = self._converted_scale(ours, scale)
-            k = k + self._rounding_of_the_conversion(ours[0]) * self.factor
-        expected = self._converted(ours, result)
-        found, good = self._called(inputs, expected.shape[1:], first, total)
-        if theirs is not None:
-            theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
-        return _FunctionResults(first, inputs, good, found, expected[good], scale[good], k[good], theirs)
+            inputs = as_tuple(self.conversion.to(*native_inputs))
+            scale = self._convert_scale(native_inputs, scale)
+            k = k + self._rounding_of_the_conversion(native_inputs[0]) * self.factor
+        expected = self._convert(native_inputs, result)
+        actual, valid = self._call_function(inputs, expected.shape[1:], first, total)
+        if oracle_results is not None:
+            oracle_results = self._convert(native_inputs, np.asarray(oracle_results)[:, 0])[valid]
+        return _FunctionResults(
+            first, inputs, valid, actual, expected[valid], scale[valid], k[valid], oracle_results
+        )
 
     def _method(
         self,
         robot: Robot,
-        ours: Sequence[FloatArray],
+        native_inputs: Sequence[FloatArray],
         frame: str | Sequence[str],
         reference: Reference | None,
         *,
@@ -464,15 +469,15 @@ class _Run:
         reference = self.reference if reference is None else reference
         named = {} if self.reference is None else {"reference": reference}
         method = getattr(robot, self.row.method)
-        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **self.options)
+        found: FloatArray = method(*native_inputs, frame=frame, verify=verify, **named, **self.options)
         return found
 
-    def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    def _native_inputs(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
         return tuple(inputs) if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
-    def _converted(
+    def _convert(
         self,
-        ours: Sequence[FloatArray],
+        native_inputs: Sequence[FloatArray],
         result: FloatArray,
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
@@ -481,10 +486,12 @@ class _Run:
             return result
         reference = self.reference if reference is None else reference
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        jacobian = partial(self.robot.jacobian, ours[0], frame or self.frame, reference, verify=False)
-        return self.conversion.convert_result(self.row.name, ours, result, jacobian)
+        jacobian = partial(
+            self.robot.jacobian, native_inputs[0], frame or self.frame, reference, verify=False
+        )
+        return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
-    def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
+    def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
@@ -503,7 +510,7 @@ class _Run:
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
-        inverse = np.abs(conversion.inverse_matrix(ours[0]))
+        inverse = np.abs(conversion.inverse_matrix(native_inputs[0]))
         found: FloatArray = np.asarray(
             scale @ inverse if name != "hessian" else np.einsum("nrkl,ki,lj->nrij", scale, inverse, inverse)
         )
@@ -524,7 +531,7 @@ class _Run:
             return 0.0
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
-    def _called(
+    def _call_function(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
         """Return the results that have the right shape, and the indices of their configurations."""
@@ -547,25 +554,31 @@ class _Run:
             if len(shape) > 1 and shape == total.shape[::-1]:
                 yield f"the result is transposed: its shape is {shape} in place of {total.shape}"
             return
-        if (kept := total.kept) is None:
+        if (first_batch := total.first_batch) is None:
             return
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
             return
-        if total.share <= 1.0:  # Only exceptions or wrong shapes: no difference needs an explanation.
+        if total.bound_ratio <= 1.0:  # Only exceptions or wrong shapes: no difference needs an explanation.
             return
-        if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
+        if total.eps_scale * EPS <= _SINGLE_PRECISION and math.isfinite(total.bound_ratio):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
                 f"rounding in {precision} precision explains all differences: the largest difference is"
                 f" {total.eps_scale * EPS:.1g} times the size of the terms;"
-                f" factor={math.ceil(total.share * self.factor)} accepts them"
+                f" factor={math.ceil(total.bound_ratio * self.factor)} accepts them"
             )
             return
         mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
-        some = slice(_DIAGNOSED)
-        inputs = tuple(x[kept.good[some]] for x in kept.inputs)
-        case = Diagnosis(inputs, kept.found[some], kept.expected[some], kept.scale[some], self.expected)
+        some = slice(_DIAGNOSIS_SAMPLES)
+        inputs = tuple(x[first_batch.valid_indices[some]] for x in first_batch.inputs)
+        case = Diagnosis(
+            inputs,
+            first_batch.actual[some],
+            first_batch.expected[some],
+            first_batch.scale[some],
+            self.compute_expected,
+        )
         yield from diagnose(mistakes, case)
 
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
@@ -593,51 +606,53 @@ class _Total:
     compared: int = 0
     not_finite: int = 0
     eps_scale: float = 0.0
-    share: float = 0.0
-    oracle_share: float = 0.0
+    bound_ratio: float = 0.0
+    oracle_bound_ratio: float = 0.0
     errors: int = 0
     first_errors: list[FunctionError] = field(default_factory=list)
     wrong_shapes: set[tuple[int, ...]] = field(default_factory=set)
     shape: tuple[int, ...] = ()
     worst: WorstResult | None = None
-    kept: _FunctionResults | None = None
+    first_batch: _FunctionResults | None = None
 
     def __post_init__(self) -> None:
         self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
 
     def error(self, sample: int, message: str, configurations: int) -> None:
         self.errors += configurations
-        if len(self.first_errors) < _MESSAGES:
+        if len(self.first_errors) < _MAX_MESSAGES:
             self.first_errors.append(FunctionError(sample, message))
 
     def add(self, part: _FunctionResults) -> None:
         self.shape = part.expected.shape[1:]
-        if not part.good:
+        if not part.valid_indices:
             return
-        self.compared += len(part.good)
-        shares, units = part.shares(part.expected), part.units(part.expected)
+        self.compared += len(part.valid_indices)
+        ratios, units = part.bound_ratios(part.expected), part.units(part.expected)
         self.eps_scale = max(self.eps_scale, float(units.max(initial=0.0)))
-        own = tuple(range(1, shares.ndim))
-        self.not_finite += int((~np.isfinite(part.found).all(axis=own)).sum())
-        of_each = shares.max(axis=own, initial=0.0)
-        self.by_row = np.maximum(self.by_row, shares.max(axis=(0, *own[1:]), initial=0.0))
+        own = tuple(range(1, ratios.ndim))
+        self.not_finite += int((~np.isfinite(part.actual).all(axis=own)).sum())
+        result_ratios = ratios.max(axis=own, initial=0.0)
+        self.by_row = np.maximum(self.by_row, ratios.max(axis=(0, *own[1:]), initial=0.0))
         if len(self.by_column):
-            self.by_column = np.maximum(self.by_column, shares.max(axis=(0, 1, *own[2:]), initial=0.0))
-        if self.kept is None:
-            self.kept = part
-        if part.found[0].size and (self.worst is None or of_each.max() > self.share):
-            k = int(of_each.argmax())
+            self.by_column = np.maximum(self.by_column, ratios.max(axis=(0, 1, *own[2:]), initial=0.0))
+        if self.first_batch is None:
+            self.first_batch = part
+        if part.actual[0].size and (self.worst is None or result_ratios.max() > self.bound_ratio):
+            k = int(result_ratios.argmax())
             self.worst = WorstResult(
-                part.first + part.good[k],
-                tuple(x[part.good[k]] for x in part.inputs),
-                part.found[k],
+                part.first + part.valid_indices[k],
+                tuple(x[part.valid_indices[k]] for x in part.inputs),
+                part.actual[k],
                 part.expected[k],
                 EPS * part.k[k] * part.scale[k],
                 "",
             )
-        self.share = max(self.share, float(of_each.max()))
-        if part.theirs is not None:
-            self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max(initial=0.0)))
+        self.bound_ratio = max(self.bound_ratio, float(result_ratios.max()))
+        if part.oracle_results is not None:
+            self.oracle_bound_ratio = max(
+                self.oracle_bound_ratio, float(part.bound_ratios(part.oracle_results).max(initial=0.0))
+            )
 
 
 def _call(

@@ -52,7 +52,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
         yield slice(start, min(count, start + most))
 
 
-def needed_bytes(tree: KinematicTree, samples: int) -> int:
+def estimate_bytes(tree: KinematicTree, samples: int) -> int:
     """Estimate the largest memory (bytes) that a check of a robot needs."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
@@ -60,7 +60,7 @@ def needed_bytes(tree: KinematicTree, samples: int) -> int:
 
 
 def check(tree: KinematicTree, samples: int, most: int | None) -> None:
-    wanted = needed_bytes(tree, samples)
+    wanted = estimate_bytes(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(
             "not enough memory to check the robot (all processes of a validation may use"

@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 #: Maximum number of bytes in an answer.
-_MOST = 64 * 2**20
+_MAX_ANSWER_BYTES = 64 * 2**20
 #: Maximum number of quoted bytes of the program's standard error.
-_TAIL = 300
+_MAX_ERROR_BYTES = 300
 #: Number of consecutive failures after which the program is not started again.
-_MOST_FAILURES = 3
+_MAX_FAILURES = 3
 _DAY = 86400.0
 
 
@@ -139,21 +139,21 @@ class Program:
         Raises:
             ProgramError: the program ended, took too long, or answered with an error or without a result.
         """
-        if self._failures >= _MOST_FAILURES:
-            raise ProgramError(f"not called: the program failed {_MOST_FAILURES} times in a row")
+        if self._failures >= _MAX_FAILURES:
+            raise ProgramError(f"not called: the program failed {_MAX_FAILURES} times in a row")
         if self._process is None:
             self._start()
         values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}
         request = json_text({**self._fixed, **values}).replace("\n", " ") + "\n"
         try:
-            answer = self._read(self._ask(request.encode()))
+            answer = self._parse_answer(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
             self._stop()  # A late line of this program would be read as the answer to the next request.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):
-            raise ProgramError(message[:_TAIL])
+            raise ProgramError(message[:_MAX_ERROR_BYTES])
         return answer["result"]
 
     def _start(self) -> None:
@@ -204,26 +204,26 @@ class Program:
                     elif part := os.read(process.stdout.fileno(), 65536):
                         line += part
                     else:
-                        raise ProgramError(self._ended())
-                if len(line) > _MOST:
+                        raise ProgramError(self._describe_exit())
+                if len(line) > _MAX_ANSWER_BYTES:
                     self._stop()
-                    raise ProgramError(f"the answer is longer than {_MOST} bytes")
+                    raise ProgramError(f"the answer is longer than {_MAX_ANSWER_BYTES} bytes")
         return bytes(line)
 
-    def _ended(self) -> str:
+    def _describe_exit(self) -> str:
         assert self._process is not None
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
         status = self._process.poll()
         self._errors.seek(0, os.SEEK_END)
-        self._errors.seek(max(0, self._errors.tell() - _TAIL))
-        message = " ".join(self._errors.read(_TAIL).decode(errors="replace").split())
+        self._errors.seek(max(0, self._errors.tell() - _MAX_ERROR_BYTES))
+        message = " ".join(self._errors.read(_MAX_ERROR_BYTES).decode(errors="replace").split())
         self._stop()
         how = "closed its output" if status is None else f"ended with exit code {status}"
         return f"the program {how}" + (f": {message}" if message else "")
 
     @staticmethod
-    def _read(line: bytes) -> dict[str, object]:
+    def _parse_answer(line: bytes) -> dict[str, object]:
         """Return an answer that has a result or the text of an error."""
         try:
             answer = json.loads(line)

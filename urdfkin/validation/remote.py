@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: The second item of "answer" is the pickled answer.
 #: The second item of "died" is the signal or exit status of the second crash.
 #: The second item of "other code" contains the worker's versions, if they differ from the client's.
-Found = (
+ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
     | tuple[Literal["other code"], dict[str, str]]
@@ -34,17 +34,17 @@ _idle: list[WorkerProcess] = []
 _lock = threading.Lock()
 
 
-def hold(robot: bytes) -> bytes:
+def store_robot(robot: bytes) -> bytes:
     """Store a robot's text on a worker. If the worker is lost, Dask calls this function on another worker."""
     return robot
 
 
-def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
-    """Run a pickled chunk in a process; `by` contains the client's versions and digests.
+def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
+    """Run a pickled chunk in a process; `client_provenance` contains the client's versions and digests.
 
     The chunk is not run if this machine has other versions or digests.
     """
-    if by != provenance():
+    if client_provenance != provenance():
         return "other code", provenance()
     cause = ""
     for start in (_idle_or_new, WorkerProcess):
@@ -77,7 +77,7 @@ class _Parcel:
 
 def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
     without_robot: Chunk = pickle.loads(chunk)
-    return replace(without_robot, subject=pickle.loads(robot))
+    return replace(without_robot, robot_input=pickle.loads(robot))
 
 
 def _idle_or_new() -> WorkerProcess:
@@ -85,7 +85,7 @@ def _idle_or_new() -> WorkerProcess:
     with _lock:
         while _idle:
             process = _idle.pop()
-            if process.alive:
+            if process.is_alive:
                 return process
             process.end()
     return WorkerProcess()

@@ -22,7 +22,7 @@ from urdfkin.urdf.catalogue import example_robots
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Timings
 from urdfkin.validation.document import VALIDATION, Document, RunOutcome, ValidationVerdict, outcome
-from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally
+from urdfkin.validation.error_stats import HISTOGRAM_EDGES, ErrorStats, Key
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
 from urdfkin.verify.oracles import ORACLES, version, versions
 from urdfkin.verify.quantities import QUANTITIES, replay_line
@@ -71,7 +71,7 @@ class RobotReport:
     reason: str | None
     joints: tuple[str, ...]
     frames: tuple[str, ...]
-    tallies: dict[Key, Tally]
+    error_stats: dict[Key, ErrorStats]
     samples: int
     seconds: float
     summary: RobotSummary = EMPTY_SUMMARY
@@ -84,20 +84,20 @@ class RobotReport:
 
     @property
     def results(self) -> int:
-        return sum(tally.results for tally in self.tallies.values())
+        return sum(stats.results for stats in self.error_stats.values())
 
     @property
     def failed(self) -> int:
         """Number of results outside their bound."""
-        return sum(tally.failed for tally in self.tallies.values())
+        return sum(stats.failed for stats in self.error_stats.values())
 
-    def of(self, quantity: str) -> list[Tally]:
-        return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
+    def stats_of(self, quantity: str) -> list[ErrorStats]:
+        return [stats for (kind, _), stats in self.error_stats.items() if kind == quantity]
 
     def replay(self, key: Key) -> str | None:
         """Return a command that computes the worst result again; None if nothing was compared."""
         quantity, reference = key
-        if (case := self.tallies[key].case) is None:
+        if (case := self.error_stats[key].case) is None:
             return None
         row = QUANTITIES[quantity]
         # The prefix "joint:" is needed because a link may have the same name.
@@ -125,14 +125,14 @@ class RobotReport:
             "findings": self.summary.findings,
             "chains": self.summary.chains,
             "second_reader": self.summary.second_reader,
-            "checks": [self._check(key) for key in self.tallies],
+            "checks": [self._check(key) for key in self.error_stats],
             "accuracy": study,
         }
 
     def _check(self, key: Key) -> dict[str, Any]:
         quantity, reference = key
-        tally = self.tallies[key]
-        case = tally.case
+        stats = self.error_stats[key]
+        case = stats.case
         worst_case = case and {
             **{name: getattr(case, name) for name in ("sample", "frame", "q", "v", "a")},
             "disagreement": case.units,
@@ -141,18 +141,18 @@ class RobotReport:
         return {
             "quantity": quantity,
             "reference": reference or None,
-            "results": tally.results,
-            "failed": tally.failed,
-            "median": tally.percentile(50.0),
-            "p99": tally.percentile(99.0),
-            "worst": tally.worst,
-            "share_of_bound": tally.share,
-            "bound": tally.bounds,
-            "histogram": tally.histogram,
+            "results": stats.results,
+            "failed": stats.failed,
+            "median": stats.percentile(50.0),
+            "p99": stats.percentile(99.0),
+            "worst": stats.worst,
+            "bound_ratio": stats.bound_ratio,
+            "bound": stats.bounds,
+            "histogram": stats.histogram,
             "subjects": QUANTITIES[quantity].of,
-            "worst_by_subject": tally.by_frame,
+            "worst_by_subject": stats.worst_by_frame,
             "worst_case": worst_case,
-        } | ({"second_oracle": tally.cross_check.as_dict()} if tally.cross_check else {})
+        } | ({"second_oracle": stats.cross_check.as_dict()} if stats.cross_check else {})
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,23 +160,24 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        asked: Number of requested robots.
+        robots_requested: Number of requested robots.
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
+        library_versions: Versions of urdfkin and the oracles that computed the report;
+            None: the installed versions.
         studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
             of a robot failed.
     """
 
     robots: tuple[RobotReport, ...]
-    asked: int
+    robots_requested: int
     samples: int
     seed: int
     started: str
     seconds: float
     interrupted: bool = False
-    made_by: dict[str, str] | None = None
+    library_versions: dict[str, str] | None = None
     studies: tuple[AccuracyStudy | None, ...] = ()
 
     def to_html(self) -> str:
@@ -191,15 +192,17 @@ class ValidationReport(Displayable):
         heads = ("robot", "verdict", "results", "outside", "worst [eps*scale]", "of the bound")
         rows = []
         for robot in self.robots:
-            tallies = robot.tallies.values()
-            worst, share = (max((getattr(x, of) for x in tallies), default=0.0) for of in ("worst", "share"))
-            figures = (f"{worst:.2g}", f"{share:.1%}") if tallies else ("", "")
+            error_stats = robot.error_stats.values()
+            worst, bound_ratio = (
+                max((getattr(x, of) for x in error_stats), default=0.0) for of in ("worst", "bound_ratio")
+            )
+            figures = (f"{worst:.2g}", f"{bound_ratio:.1%}") if error_stats else ("", "")
             rows.append((robot.source, robot.verdict.value, str(robot.results), str(robot.failed), *figures))
         verified = sum(robot.verdict is ValidationVerdict.VERIFIED for robot in self.robots)
         samples = f"{self.samples} samples of each robot, seed {self.seed}, in {self.seconds:.1f} s."
         reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
         return TextDocument(
-            f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons)
+            f"{verified} of {self.robots_requested} robots verified", (Table(heads, rows), samples, *reasons)
         )
 
     @property
@@ -218,7 +221,7 @@ class ValidationReport(Displayable):
     @property
     def outcome(self) -> RunOutcome:
         """The outcome of the run, with the reason if it has not passed."""
-        return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
+        return outcome((robot.verdict for robot in self.robots), self.robots_requested, self.interrupted)
 
     @property
     def passed(self) -> bool:
@@ -238,7 +241,7 @@ class ValidationReport(Displayable):
         studies = iter(self.studies)  # Only compared robots have an accuracy result.
         document = {
             "schema": VALIDATION.name,
-            "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
+            "versions": self.library_versions or versions(robot.origin.oracle for robot in self.robots),
             "sha256": [robot.summary.model and robot.summary.model["sha256"] for robot in self.robots],
             "verdict": self.outcome.verdict,
             "command": self.command,
@@ -247,11 +250,11 @@ class ValidationReport(Displayable):
             "seed": self.seed,
             "samples": self.samples,
             "histogram_edges": HISTOGRAM_EDGES,
-            "asked": self.asked,
+            "robots_requested": self.robots_requested,
             "interrupted": self.interrupted,
             "reason": self.outcome.reason,
             "robots": [
-                robot.as_dict(next(studies, None) if robot.tallies else None) for robot in self.robots
+                robot.as_dict(next(studies, None) if robot.error_stats else None) for robot in self.robots
             ],
         }
         return cast("Document", plain(document))

@@ -36,7 +36,7 @@ class RobotInput:
 
     Attributes:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
-        stamp: The sha256 of the robot's text; empty if the text cannot be read.
+        sha256: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in errors and warnings, if `source` is the text of the robot.
         listed: Errors and warnings about the original MJCF or USD file.
         made: Whether the text was converted to URDF from another format.
@@ -44,7 +44,7 @@ class RobotInput:
 
     source: str | bytes
     origin: Origin
-    stamp: str = ""
+    sha256: str = ""
     file: str = "<bytes>"
     listed: tuple[Finding, ...] = ()
     made: bool = False
@@ -52,8 +52,8 @@ class RobotInput:
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
         if robot.source in catalogue():
-            found = _from_word(robot.source, robot.origin.mimic, robot.origin.root_joint)
-            return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
+            robot_input = _from_word(robot.source, robot.origin.mimic, robot.origin.root_joint)
+            return replace(robot_input, origin=replace(robot_input.origin, lock=robot.origin.lock))
         listed = tuple(finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD")))
         return replace(_from_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
 
@@ -66,7 +66,7 @@ class RobotInput:
         if isinstance(self.source, bytes):
             return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
         text = read_source(self.source)
-        if self.stamp and _digest(text.data) != self.stamp:
+        if self.sha256 and _digest(text.data) != self.sha256:
             raise InputError(
                 "the file has changed since the validation began",
                 where=text.label,
@@ -74,7 +74,7 @@ class RobotInput:
             )
         return text
 
-    def carried(self) -> RobotInput:
+    def with_text(self) -> RobotInput:
         """Return a copy that contains the text, for a machine without the file."""
         text = self.text()
         return replace(self, source=text.data, file=text.label)
@@ -102,7 +102,7 @@ class RobotInput:
         return robot
 
 
-def subjects(
+def make_robot_inputs(
     robots: Sequence[RobotSource],
     mimic: bool | None = None,
     root_joint: str | None = None,
@@ -110,21 +110,21 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    found, errors = list[RobotInput](), dict[int, Exception]()
+    robot_inputs, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
-            found.append(subject(robot, mimic, root_joint, xacro_args, lock, joints))
+            robot_inputs.append(make_robot_input(robot, mimic, root_joint, xacro_args, lock, joints))
         except Exception as error:
             if isinstance(robot, os.PathLike):
                 name = unambiguous_path(Path(robot))
             else:
                 name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
-            found.append(RobotInput(b"", Origin(name, mimic, root_joint)))
+            robot_inputs.append(RobotInput(b"", Origin(name, mimic, root_joint)))
             errors[i] = error
-    return found, errors
+    return robot_inputs, errors
 
 
-def subject(
+def make_robot_input(
     robot: RobotSource,
     mimic: bool | None = None,
     root_joint: str | None = None,
@@ -132,13 +132,13 @@ def subject(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> RobotInput:
-    found = _subject(robot, mimic, root_joint, xacro_args)
+    robot_input = _make_robot_input(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
-        return found
-    return replace(found, origin=found.read().locked(lock, joints).origin)
+        return robot_input
+    return replace(robot_input, origin=robot_input.read().locked(lock, joints).origin)
 
 
-def _subject(
+def _make_robot_input(
     robot: RobotSource, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
 ) -> RobotInput:
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
@@ -155,7 +155,7 @@ def _subject(
         return _from_word(source, mimic, root_joint)
     text = read_source(source)  # An open file, or standard input, can be read only once.
     if is_mjcf(text.data):
-        return _subject(text.data, mimic, root_joint, None)
+        return _make_robot_input(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 

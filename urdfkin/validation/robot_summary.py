@@ -75,7 +75,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": joint.limit,
         "mimic": joint.mimic,
-        "kept": _remaining_range(narrowed.get(joint.name)),
+        "remaining_range": _remaining_range(narrowed.get(joint.name)),
         **({} if joint.lock is None else {"locked": joint.lock.value}),
     }
 
@@ -132,14 +132,14 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
         for name, table in tables.items()
     }
     if oracle is None:
-        return data | {"samples": 0, "metres": None, "worst": None, "share_of_bound": None}
+        return data | {"samples": 0, "metres": None, "worst": None, "bound_ratio": None}
     drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
     checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
     return data | {
         "samples": checks[0].samples,
         "metres": max(check.metres for check in checks),
         "worst": max(units for check in checks for units in check.units.values()),
-        "share_of_bound": max(share for check in checks for share in check.shares.values()),
+        "bound_ratio": max(share for check in checks for share in check.shares.values()),
     }
 
 
@@ -167,7 +167,7 @@ class RobotSummary:
 
 
 def chain_disagreement(chain: Chain) -> str | None:
-    share = chain["share_of_bound"]
+    share = chain["bound_ratio"]
     if not chain["samples"] or (share is not None and share <= 1.0):
         return None
     how = "by an infinite amount" if share is None else f"{share:.3g} times the bound"

@@ -47,7 +47,7 @@ from urdfkin.validation.answer import (
     pack,
     unpack,
 )
-from urdfkin.validation.chunk import Cut
+from urdfkin.validation.chunk import Chunking
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version, versions
@@ -58,9 +58,9 @@ if TYPE_CHECKING:
 #: Name and version of the layout of a store.
 _LAYOUT = "urdfkin-campaign/1"
 #: Maximum number of differences between two campaigns that an error lists.
-_SHOWN = 4
-_MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
-_WRITING = ".writing"
+_MAX_DIFFERENCES = 4
+_MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
+_SCRATCH = ".writing"
 #: File with the settings of the accuracy study.
 _STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
@@ -72,7 +72,7 @@ _TRIES = 10
 
 _T = TypeVar("_T")
 
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -91,21 +91,21 @@ class Manifest:
     started: str
 
     @classmethod
-    def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
-        robots = tuple((subject.origin, subject.stamp) for subject in subjects)
-        oracles = (subject.origin.oracle for subject in subjects)
+    def of(cls, robot_inputs: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
+        robots = tuple((robot_input.origin, robot_input.sha256) for robot_input in robot_inputs)
+        oracles = (robot_input.origin.oracle for robot_input in robot_inputs)
         return cls(robots, samples, seed, provenance(), versions(oracles), started)
 
     @cached_property
-    def cut(self) -> Cut:
-        return Cut(self.samples)
+    def chunking(self) -> Chunking:
+        return Chunking(self.samples)
 
-    def subjects(self) -> list[RobotInput]:
+    def make_robot_inputs(self) -> list[RobotInput]:
         """Return the robots without their texts, which a report does not need."""
-        return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
+        return [RobotInput(origin.source, origin, sha256) for origin, sha256 in self.robots]
 
     def key(self, robot: int, index: int) -> str:
-        return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.cut)}".encode()).hexdigest()
+        return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.chunking)}".encode()).hexdigest()
 
     @cached_property
     def _keys(self) -> list[str]:
@@ -134,11 +134,15 @@ class Manifest:
             if own.get(name) != theirs.get(name)
         ]
         lines += [
-            f"robot {i + 1} {_called(robot)} and {_called(other_robot)}"
+            f"robot {i + 1} {_describe_robot(robot)} and {_describe_robot(other_robot)}"
             for i, (robot, other_robot) in enumerate(zip(self.robots, other.robots, strict=False))
             if robot != other_robot
         ]
-        return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
+        return (
+            [*lines[:_MAX_DIFFERENCES], f"{len(lines) - _MAX_DIFFERENCES} more"]
+            if len(lines) > _MAX_DIFFERENCES + 1
+            else lines
+        )
 
 
 def _short(value: object) -> str:
@@ -146,9 +150,9 @@ def _short(value: object) -> str:
     return text[:12] if len(text) == 64 else text
 
 
-def _called(robot: tuple[Origin, str]) -> str:
-    origin, stamp = robot
-    return f"{origin.command_line} (sha256 {stamp[:12] or 'unknown'})"
+def _describe_robot(robot: tuple[Origin, str]) -> str:
+    origin, sha256 = robot
+    return f"{origin.command_line} (sha256 {sha256[:12] or 'unknown'})"
 
 
 @dataclass(frozen=True)
@@ -157,82 +161,81 @@ class Store:
 
     folder: Path
     manifest: Manifest
-    tell: Tell
+    notify: Notify
     scratch: Path | None = None
 
     @classmethod
-    def reading(cls, folder: Path, tell: Tell) -> Store:
+    def open_read_only(cls, folder: Path, notify: Notify) -> Store:
         """Return a read-only store; another process may be writing to the same folder."""
-        place = folder / _MANIFEST
-        return cls(folder, Manifest.from_json(read_bytes(place), str(place)), tell)
+        path = folder / _MANIFEST
+        return cls(folder, Manifest.from_json(read_bytes(path), str(path)), notify)
 
-    def answer(self, robot: int, index: int) -> Answer | None:
+    def read_answer(self, robot: int, index: int) -> Answer | None:
         key = self.manifest.key(robot, index)
-        return self.entry(key, _DONE, decode_answer) or self.entry(key, _FAILED, decode_answer)
+        return self.read_entry(key, _DONE, decode_answer) or self.read_entry(key, _FAILED, decode_answer)
 
-    def entry(self, key: str, kind: str, decode: Callable[[str, bytes], _T]) -> _T | None:
+    def read_entry(self, key: str, kind: str, decode: Callable[[str, bytes], _T]) -> _T | None:
         """Return the decoded content of a file; None if the file is missing or damaged."""
-        place = self._place(key, kind)
+        path = self._path_of(key, kind)
         try:
-            content = read_if_there(place)
+            content = read_if_there(path)
             return None if content is None else decode(key, content)
         except (DamagedError, OSError) as error:
             why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)
-            self._quarantine(place, f"is damaged and is computed again: {why}")
+            self._quarantine(path, f"is damaged and is computed again: {why}")
             return None
 
-    def keep(self, robot: int, index: int, found: Answer) -> None:
+    def write_answer(self, robot: int, index: int, answer: Answer) -> None:
         """Write an answer; when this method returns, the complete file is on disk."""
         key = self.manifest.key(robot, index)
-        self.write_entry(key, _FAILED if isinstance(found, Failure) else _DONE, encode_answer(key, found))
+        self.write_entry(key, _FAILED if isinstance(answer, Failure) else _DONE, encode_answer(key, answer))
 
-    def has(self, key: str, kind: str) -> bool:
-        return self._place(key, kind).exists()
-
-    @property
-    def has_study(self) -> bool:
-        return (self.folder / _STUDY_FILE).exists()
+    def has_entry(self, key: str, kind: str) -> bool:
+        return self._path_of(key, kind).exists()
 
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
-        self._write(self._place(key, kind), data)
+        self._write(self._path_of(key, kind), data)
 
-    def forget_failures(self) -> None:
-        for place in self._files(_FAILED):
-            place.unlink(missing_ok=True)
+    def delete_failures(self) -> None:
+        for path in self._files(_FAILED):
+            path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
         """Report files whose names belong to no chunk, such as renamed files, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
-            for index in range(len(self.manifest.cut))
+            for index in range(len(self.manifest.chunking))
         )
-        expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
-        for place in sorted((self.folder / _CHUNKS).glob("*/*")):
-            if place not in expected and place.suffix != _STUDY_SUFFIX:
-                self._quarantine(place, "is not used: no chunk of this campaign has this name")
+        expected = {self._path_of(key, kind) for key in keys for kind in (_DONE, _FAILED)}
+        for path in sorted((self.folder / _CHUNKS).glob("*/*")):
+            if path not in expected and path.suffix != _STUDY_SUFFIX:
+                self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
-    def counts(self) -> dict[int, tuple[int, bool]]:
+    def count_chunks(self) -> dict[int, tuple[int, bool]]:
         """Return (number of stored chunks, whether a chunk failed) for each robot, from file names only."""
-        names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
-        found = {}
+        names = {path.name for kind in (_DONE, _FAILED) for path in self._files(kind)}
+        counts = {}
         for robot in range(len(self.manifest.robots)):
-            keys = [self.manifest.key(robot, index) for index in range(len(self.manifest.cut))]
+            keys = [self.manifest.key(robot, index) for index in range(len(self.manifest.chunking))]
             done = sum(key + _DONE in names for key in keys)
-            found[robot] = done, any(key + _FAILED in names for key in keys)
-        return found
+            counts[robot] = done, any(key + _FAILED in names for key in keys)
+        return counts
 
     def copy_missing(self, other: Store) -> int:
         other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
-            for index in range(len(self.manifest.cut)):
-                if self.answer(robot, index) is None and (found := other.answer(robot, index)) is not None:
-                    self.keep(robot, index, found)
+            for index in range(len(self.manifest.chunking)):
+                if (
+                    self.read_answer(robot, index) is None
+                    and (answer := other.read_answer(robot, index)) is not None
+                ):
+                    self.write_answer(robot, index, answer)
                     taken += 1
         return taken
 
-    def check_same(self, manifest: Manifest, where: object = None) -> None:
+    def check_same_campaign(self, manifest: Manifest, where: object = None) -> None:
         if differences := self.manifest.differences(manifest):
             there = "here" if where is None else f"in {where}"
             raise InputError(
@@ -245,38 +248,38 @@ class Store:
     def writing_process(self) -> str | None:
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
-                return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
+                return None if _try_lock(file, fcntl.LOCK_SH) else _read_holder(file)
         except OSError:
             return None
 
     def write(self, name: str, data: bytes) -> None:
         self._write(self.folder / name, data)
 
-    def _place(self, key: str, kind: str) -> Path:
+    def _path_of(self, key: str, kind: str) -> Path:
         return self.folder / _CHUNKS / key[:2] / (key + kind)
 
     def _files(self, kind: str) -> Iterator[Path]:
         return (self.folder / _CHUNKS).glob(f"*/*{kind}")
 
-    def _quarantine(self, place: Path, why: str) -> None:
-        self.tell(f"{place} {why}")
+    def _quarantine(self, path: Path, why: str) -> None:
+        self.notify(f"{path} {why}")
         if self.scratch is not None:
-            damaged = self.folder / _ASIDE
+            damaged = self.folder / _DAMAGED
             with contextlib.suppress(OSError):
                 damaged.mkdir(exist_ok=True)
-                place.replace(damaged / place.name)
+                path.replace(damaged / path.name)
 
-    def _write(self, place: Path, data: bytes) -> None:
+    def _write(self, path: Path, data: bytes) -> None:
         if self.scratch is None:
             raise SourceError("the store is read-only", where=str(self.folder))
-        unfinished = self.scratch / place.name
+        unfinished = self.scratch / path.name
         try:
-            place.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             with unfinished.open("wb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            unfinished.replace(place)
+            unfinished.replace(path)
         except OSError as error:
             raise SourceError(
                 "the store cannot be written",
@@ -288,7 +291,7 @@ class Store:
 
 @contextlib.contextmanager
 def open_store(
-    folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
+    folder: Path, manifest: Manifest, notify: Notify, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock the store for writing.
 
@@ -303,19 +306,19 @@ def open_store(
                 where=str(folder),
                 remedy="give an empty or a new folder",
             )
-        with _locked(folder, shard):
-            if (folder / _WRITING).is_symlink():
+        with _hold_lock(folder, shard):
+            if (folder / _SCRATCH).is_symlink():
                 raise SourceError(
                     "a symbolic link replaces a folder of the store",
-                    where=str(folder / _WRITING),
+                    where=str(folder / _SCRATCH),
                     remedy="delete the link",
                 )
-            scratch = folder / _WRITING / (shard or "all").replace("/", "-of-")
+            scratch = folder / _SCRATCH / (shard or "all").replace("/", "-of-")
             shutil.rmtree(scratch, ignore_errors=True)  # A killed process leaves unfinished files.
             scratch.mkdir(parents=True)
             try:
                 store = _check_or_write_manifest(
-                    Store(folder, manifest, tell, scratch), retry_failed=retry_failed
+                    Store(folder, manifest, notify, scratch), retry_failed=retry_failed
                 )
                 store.check_names()
                 yield store
@@ -334,7 +337,7 @@ def _is_ours(path: Path) -> bool:
 
     The process of another shard creates locks and folders before it writes the manifest.
     """
-    return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
+    return path.name in (_SCRATCH, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
@@ -346,12 +349,12 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
         return store
-    before = replace(store, manifest=Store.reading(store.folder, store.tell).manifest)
+    before = replace(store, manifest=Store.open_read_only(store.folder, store.notify).manifest)
     is_changed = retry_failed and _only_failed_robots_differ(before, store.manifest)
     if not is_changed:
-        before.check_same(store.manifest)
+        before.check_same_campaign(store.manifest)
     if retry_failed:
-        before.forget_failures()
+        before.delete_failures()
     if is_changed:
         store.write(_MANIFEST, store.manifest.as_json())
         return store
@@ -363,12 +366,12 @@ def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
     if len(own) != len(theirs) or replace(store.manifest, robots=theirs).differences(manifest):
         return False
     differ = [i for i, robots in enumerate(zip(own, theirs, strict=True)) if robots[0] != robots[1]]
-    counts = store.counts()
+    counts = store.count_chunks()
     return bool(differ) and all(counts[i][1] and own[i][0] == theirs[i][0] for i in differ)
 
 
 @contextlib.contextmanager
-def _locked(folder: Path, shard: str | None) -> Iterator[None]:
+def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         file = stack.enter_context(_lock_file(folder / _LOCK))
         _lock(file, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
@@ -381,43 +384,43 @@ def _locked(folder: Path, shard: str | None) -> Iterator[None]:
         yield
 
 
-def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
+def _lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
     """Open the file of a lock; raise SourceError if the path is a link, a pipe or a device."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
-        descriptor = os.open(place, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise SourceError(message, where=str(place), found="a link", remedy=remedy) from error
+            raise SourceError(message, where=str(path), found="a link", remedy=remedy) from error
         raise
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise SourceError(message, where=str(place), found="another kind of file", remedy=remedy)
-    return os.fdopen(descriptor, "rb" if how == os.O_RDONLY else "a+b")
+        raise SourceError(message, where=str(path), found="another kind of file", remedy=remedy)
+    return os.fdopen(descriptor, "rb" if flags == os.O_RDONLY else "a+b")
 
 
-def _lock(file: IO[bytes], how: int, folder: Path) -> None:
+def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
-        if _try_lock(file, how):
+        if _try_lock(file, flags):
             return
         time.sleep(0.1)  # Another process may hold the lock for a moment, to test the lock.
     raise InputError(
         "another process uses this store",
         where=str(folder),
-        found=_holder(file),
+        found=_read_holder(file),
         remedy="wait until that process ends, or use another folder",
     )
 
 
-def _try_lock(file: IO[bytes], how: int) -> bool:
+def _try_lock(file: IO[bytes], flags: int) -> bool:
     try:
-        fcntl.flock(file, how | fcntl.LOCK_NB)
+        fcntl.flock(file, flags | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     return True
 
 
-def _holder(file: IO[bytes]) -> str:
+def _read_holder(file: IO[bytes]) -> str:
     try:
         file.seek(0)
         data = json.loads(file.read(1000))
@@ -448,57 +451,57 @@ class StudySettings:
         return f"--accuracy-samples {self.samples} --seed {self.seed}{moving}"
 
 
-class AccuracyResult:
+class AccuracyStore:
     def __init__(self, store: Store, settings: StudySettings) -> None:
         self._store, self._settings = store, settings
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        theirs = [results for results in map(cls.of, others) if results is not None]
+        theirs = [results for results in map(cls.open, others) if results is not None]
         if not theirs:
             return
-        own = cls.of(store) or cls(store, theirs[0]._settings)
+        own = cls.open(store) or cls(store, theirs[0]._settings)
         for results in theirs:
             own._check_same(results)
-        own.begin()
+        own.write_settings()
         for results in theirs:
             for robot in range(len(store.manifest.robots)):
-                if own.found(robot) is None and (found := results.found(robot)) is not None:
-                    own.keep(robot, found)
+                if own.read(robot) is None and (study := results.read(robot)) is not None:
+                    own.write(robot, study)
 
     @classmethod
-    def of(cls, store: Store) -> AccuracyResult | None:
+    def open(cls, store: Store) -> AccuracyStore | None:
         """Return the results in a store; None if there are none, or the settings are unreadable."""
         try:
             if (content := read_if_there(store.folder / _STUDY_FILE)) is None:
                 return None
             settings = typed(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
-            store.tell(
+            store.notify(
                 f"{store.folder / _STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
                 " accuracy results"
             )
             return None
         return cls(store, settings)
 
-    def begin(self) -> None:
+    def write_settings(self) -> None:
         self._store.write(_STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
-    def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
-        return self._store.entry(self._key(robot), _STUDY_SUFFIX, _decode)
+    def read(self, robot: int) -> AccuracyStudy | FailedStudy | None:
+        return self._store.read_entry(self._key(robot), _STUDY_SUFFIX, _decode)
 
     def has(self, robot: int) -> bool:
-        return self._store.has(self._key(robot), _STUDY_SUFFIX)
+        return self._store.has_entry(self._key(robot), _STUDY_SUFFIX)
 
-    def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
+    def write(self, robot: int, study: AccuracyStudy | FailedStudy) -> None:
         key = self._key(robot)
-        self._store.write_entry(key, _STUDY_SUFFIX, pack(key, {"accuracy": found}))
+        self._store.write_entry(key, _STUDY_SUFFIX, pack(key, {"accuracy": study}))
 
-    def stamp(self, robot: int) -> str:
+    def robot_sha256(self, robot: int) -> str:
         """Return the sha256 of the robot's text."""
         return self._store.manifest.robots[robot][1]
 
-    def _check_same(self, other: AccuracyResult) -> None:
+    def _check_same(self, other: AccuracyStore) -> None:
         if other._settings != self._settings:
             raise InputError(
                 "the accuracy results in the two folders were computed with different options",
@@ -509,9 +512,9 @@ class AccuracyResult:
 
     def _key(self, robot: int) -> str:
         manifest = self._store.manifest
-        origin, stamp = manifest.robots[robot]
+        origin, sha256 = manifest.robots[robot]
         origin = replace(origin, oracle=None)  # The study uses no second oracle.
-        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
+        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), sha256]
         return hashlib.sha256(json.dumps([_LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
 
 

@@ -36,14 +36,7 @@ from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.verify.bounds import true_value_magnitudes
-from urdfkin.verify.exact.numbers import (
-    DIGITS,
-    conversion,
-    decimal,
-    enough_digits,
-    precision,
-    read_exact,
-)
+from urdfkin.verify.exact.numbers import DIGITS, conversion, decimal, enough_digits, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.quantities import (
     ACCELERATION,
@@ -168,10 +161,10 @@ class Feature:
     frames: tuple[str, ...]
 
 
-def stem(name: str) -> str:
+def file_stem(name: str) -> str:
     """Return the name of a robot's files without a suffix.
 
-    >>> stem("rpy at pitch -pi/2")
+    >>> file_stem("rpy at pitch -pi/2")
     'rpy_at_pitch_minus_pi_2'
     """
     return re.sub(r"[^\w.]+", "_", name.replace(" -", " minus ")).strip("_.") or "robot"
@@ -268,7 +261,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class VectorFiles:
     """The files of one robot, and the number of values in each file of vectors."""
 
     robot: str
@@ -277,7 +270,7 @@ class Written:
 
 
 @dataclass(frozen=True, slots=True)
-class _Head:
+class _Header:
     robot: str
     file: str
     sha256: str
@@ -286,35 +279,35 @@ class _Head:
     license: str | None = LICENCE
 
 
-def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
+def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles]:
     for feature in features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             robot = load(feature.text, verify=False)
-        place = folder / stem(feature.name)
+        place = folder / file_stem(feature.name)
         file = place.with_name(f"{place.name}.urdf")
         write_file(file, feature.data)
         sha256 = hashlib.sha256(feature.data).hexdigest()
-        head = _Head(feature.name, file.name, sha256, feature.rule, feature.note)
+        head = _Header(feature.name, file.name, sha256, feature.rule, feature.note)
         found = _write(place, robot, head, feature.frames, samples)
         yield replace(found, files=(*found.files, file))
 
 
-def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
+def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
     """Write the test vectors of a robot's default tip, with its URDF if the robot is not in the catalogue."""
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
         sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()
-        head = _Head(name, entry.relative_path.as_posix(), sha256, note=entry.mimic_problem)
-        return _write(folder / stem(name), robot, head, frames, samples)
-    data, file = robot.urdf.encode(), f"{stem(name)}.urdf"
+        head = _Header(name, entry.relative_path.as_posix(), sha256, note=entry.mimic_problem)
+        return _write(folder / file_stem(name), robot, head, frames, samples)
+    data, file = robot.urdf.encode(), f"{file_stem(name)}.urdf"
     write_file(folder / file, data)
-    head = _Head(name, file, hashlib.sha256(data).hexdigest(), license=None)
-    found = _write(folder / stem(name), robot, head, frames, samples)
+    head = _Header(name, file, hashlib.sha256(data).hexdigest(), license=None)
+    found = _write(folder / file_stem(name), robot, head, frames, samples)
     return replace(found, files=(*found.files, folder / file))
 
 
-def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
+def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles]:
     for name in catalogue():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -326,7 +319,7 @@ def name_of(robot: Robot) -> str:
     return robot.source if robot.source in catalogue() else robot.name
 
 
-def write_sums(folder: Path, written: Sequence[Written]) -> Path:
+def write_sums(folder: Path, written: Sequence[VectorFiles]) -> Path:
     """Write SHA256SUMS for all files, in the format of `sha256sum --check`."""
     lines = [
         f"{hashlib.sha256(read_bytes(path, MOST_DATA)).hexdigest()}  {path.name}\n"
@@ -337,7 +330,7 @@ def write_sums(folder: Path, written: Sequence[Written]) -> Path:
     return folder / "SHA256SUMS"
 
 
-def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], samples: int) -> Written:
+def _write(place: Path, robot: Robot, head: _Header, frames: Sequence[str], samples: int) -> VectorFiles:
     tree = robot.tree
     found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
     rows = [
@@ -370,7 +363,7 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
     files = place.with_name(f"{place.name}.json"), place.with_name(f"{place.name}.tsv")
     write_file(files[0], f'{{\n{top} "samples": [\n{body}\n ]\n}}\n'.encode())
     write_file(files[1], "".join(f"{row}\n" for row in rows).encode())
-    return Written(head.robot, files, sum(len(one["value"]) for _, results in found for one in results))
+    return VectorFiles(head.robot, files, sum(len(one["value"]) for _, results in found for one in results))
 
 
 def _result(one: Mapping[str, Any]) -> str:

@@ -27,12 +27,12 @@ from urdfkin.validation.answer import (
     CRASHED_TWICE,
     Answer,
     Failure,
-    answer,
-    crash_failure,
-    lost_failure,
+    answer_chunk,
+    make_crash_failure,
+    make_lost_failure,
 )
 from urdfkin.validation.chunk import Chunk
-from urdfkin.validation.engines import Enter, RobotTasks, Task, Work, WorkQueue
+from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, WorkQueue
 
 #: Module with the function `serve`, which each worker process runs.
 WORKER = "urdfkin.validation.worker_processes"
@@ -53,7 +53,7 @@ class WorkerProcess:
             theirs.close()
 
     @property
-    def alive(self) -> bool:
+    def is_alive(self) -> bool:
         return self._process.poll() is None
 
     def end(self) -> None:
@@ -102,7 +102,7 @@ def serve(pipe: int, parent: int) -> None:
     connection, chunks = Connection(pipe), SimpleQueue[Chunk]()
     threading.Thread(target=_receive_chunks, args=(connection, chunks), daemon=True).start()
     while True:
-        connection.send(answer(chunks.get()))
+        connection.send(answer_chunk(chunks.get()))
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
@@ -128,15 +128,15 @@ class ProcessEngine:
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate
 
-    def run(self, work: Work, enter: Enter) -> None:
+    def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks. If a robot crashed its process, the robot's remaining tasks run last and alone."""
         if self._isolate:
-            _WorkerPool(work, self._jobs, enter, alone=CRASHED).work()
+            _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
             return
-        pool = _WorkerPool(work, self._jobs, enter)
+        pool = _WorkerPool(work, self._jobs, on_answer)
         pool.work()
         to_retry = [sorted(tasks, key=lambda task: task.chunk.index) for tasks in pool.to_retry.values()]
-        _WorkerPool(to_retry, 1, enter, alone=CRASHED_TWICE).work()
+        _WorkerPool(to_retry, 1, on_answer, alone=CRASHED_TWICE).work()
 
 
 class _WorkerPool:
@@ -146,8 +146,8 @@ class _WorkerPool:
     text `alone` as the reason.
     """
 
-    def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
-        self._jobs, self._enter, self._alone = jobs, enter, alone
+    def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:
+        self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
         #: Tasks to run again, for each robot whose worker process crashed.
@@ -184,7 +184,7 @@ class _WorkerPool:
                     # A running process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
-                self._enter_answer(task, lost_failure("no process could be started", error))
+                self._enter_answer(task, make_lost_failure("no process could be started", error))
                 continue
             self._send(worker, task, tasks)
 
@@ -197,13 +197,13 @@ class _WorkerPool:
 
     def _receive(self, worker: _BusyWorker, task: Task) -> None:
         try:
-            found: Answer = worker.connection.recv()
+            answer: Answer = worker.connection.recv()
         except (EOFError, OSError):
             self._handle_crash(worker, task)
             return
         except Exception as error:
-            found = lost_failure("the answer of the worker process cannot be read", error)
-        self._enter_answer(task, found)
+            answer = make_lost_failure("the answer of the worker process cannot be read", error)
+        self._enter_answer(task, answer)
         worker.task = None
         if (next_task := self._queue.next(worker.tasks)) is not None:
             self._send(worker, next_task, worker.tasks)
@@ -211,11 +211,11 @@ class _WorkerPool:
             self._workers.remove(worker)
             worker.end()
 
-    def _enter_answer(self, task: Task, found: Answer) -> None:
-        if isinstance(found, Failure):
-            self._queue.end(task.robot)
+    def _enter_answer(self, task: Task, answer: Answer) -> None:
+        if isinstance(answer, Failure):
+            self._queue.remove(task.robot)
             self.to_retry.pop(task.robot, None)
-        self._enter(task, found)
+        self._on_answer(task, answer)
 
     def _handle_crash(self, worker: _BusyWorker, task: Task) -> None:
         self._workers.remove(worker)
@@ -223,7 +223,7 @@ class _WorkerPool:
         if self._alone is None:
             self.to_retry.setdefault(task.robot, []).extend([task, *self._queue.withdraw(task.robot)])
         else:
-            self._enter_answer(task, crash_failure(task.chunk.subject, self._alone, cause))
+            self._enter_answer(task, make_crash_failure(task.chunk.robot_input, self._alone, cause))
 
 
 class _BusyWorker(WorkerProcess):

@@ -27,7 +27,7 @@ _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#
 _ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
-def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
+def draw_table_svg(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
     """Return an SVG drawing of the table's chain at one configuration.
 
     `q` contains the joint positions (rad or m), or maps joint names to them. None is the zero configuration.

@@ -74,14 +74,14 @@ def label(name: str) -> str:
     return printable(name)
 
 
-def installed() -> bool:
+def has_matplotlib() -> bool:
     return importlib.util.find_spec("matplotlib") is not None
 
 
 @cache
 def _matplotlib() -> Any:
     """Import matplotlib without the settings of a file `matplotlibrc` in the current folder."""
-    if not installed():
+    if not has_matplotlib():
         raise InputError("drawing needs matplotlib", remedy=install_remedy("plots"))
     with not_reading("matplotlibrc"):
         return importlib.import_module("matplotlib")

@@ -17,7 +17,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory
-from urdfkin.view.plot import foot
+from urdfkin.view.plot import caption
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
@@ -64,7 +64,7 @@ class Player:
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
-        self._check_line = mark + foot(motion, x)
+        self._check_line = mark + caption(motion, x)
         self._write()
 
     def show(self, sample: int) -> None:

@@ -38,19 +38,19 @@ _MOST_NAMES = 14
 _UNNAMED = "#9AA7B5"
 
 
-def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
+def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
     for k, name in enumerate(names):
-        axes.plot(t, rows[:, k], label=name, **_look(k))
+        axes.plot(t, rows[:, k], label=name, **_line_style(k))
 
 
-def _look(k: int) -> dict[str, Any]:
+def _line_style(k: int) -> dict[str, Any]:
     """Return the colour and the dashes of line k; they differ for the first 49 lines."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
-def _xyz(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
+def _make_xyz_panel(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
     def panel(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-        _lines(axes, t, vector(x), ("x", "y", "z"))
+        _draw_lines(axes, t, vector(x), ("x", "y", "z"))
         axes.set_ylabel(label)
 
     return panel
@@ -62,20 +62,20 @@ def _rotation(x: FrameMotion) -> FloatArray:
     return log_rotation(R @ R[0].T)
 
 
-def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+def draw_parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
     names = tuple(KINDS[k] for k in used)
-    _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
+    _draw_lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
     axes.set_ylabel("norms of the parts [m/s²]")
 
 
-def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
-    _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
+    _draw_lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
@@ -86,13 +86,13 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")
 
 
-def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
+def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
+    _draw_lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
     axes.set_ylim(0.0, 1.08 * float(axes.dataLim.y1) or 1.0)
 
 
-def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the disagreement with Pinocchio, and its bound as a thin line, in units of eps * scale.
 
     eps is 2**-52. The scale is an upper bound on the sum of the absolute values of the terms of a number.
@@ -102,8 +102,8 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
-        axes.plot(t, check.units, label=quantity, **_look(k))
-        axes.plot(t, check.bound, linewidth=0.6, **_look(k))
+        axes.plot(t, check.units, label=quantity, **_line_style(k))
+        axes.plot(t, check.bound, linewidth=0.6, **_line_style(k))
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
@@ -115,18 +115,18 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 PANELS: dict[str, Panel] = {
-    "position": _xyz(lambda x: x.placement[:, :3, 3], "position [m]"),
-    "orientation": _xyz(_rotation, "rotation [rad]"),
-    "velocity": _xyz(lambda x: x.velocity[:, :3], "velocity [m/s]"),
-    "angular-velocity": _xyz(lambda x: x.velocity[:, 3:], "angular velocity\n[rad/s]"),
-    "acceleration": _xyz(lambda x: x.acceleration[:, :3], "acceleration [m/s²]"),
-    "angular-acceleration": _xyz(lambda x: x.acceleration[:, 3:], "ang. acceleration\n[rad/s²]"),
-    "parts": parts,
-    "singular-values": partial(singular_values, rows=_LINEAR, unit="m/s"),
-    "angular-singular-values": partial(singular_values, rows=_ANGULAR, unit="rad/s"),
-    "manipulability": partial(manipulability, rows=_LINEAR, unit="(m/s)³"),
-    "angular-manipulability": partial(manipulability, rows=_ANGULAR, unit="(rad/s)³"),
-    "disagreement": disagreement,
+    "position": _make_xyz_panel(lambda x: x.placement[:, :3, 3], "position [m]"),
+    "orientation": _make_xyz_panel(_rotation, "rotation [rad]"),
+    "velocity": _make_xyz_panel(lambda x: x.velocity[:, :3], "velocity [m/s]"),
+    "angular-velocity": _make_xyz_panel(lambda x: x.velocity[:, 3:], "angular velocity\n[rad/s]"),
+    "acceleration": _make_xyz_panel(lambda x: x.acceleration[:, :3], "acceleration [m/s²]"),
+    "angular-acceleration": _make_xyz_panel(lambda x: x.acceleration[:, 3:], "ang. acceleration\n[rad/s²]"),
+    "parts": draw_parts,
+    "singular-values": partial(draw_singular_values, rows=_LINEAR, unit="m/s"),
+    "angular-singular-values": partial(draw_singular_values, rows=_ANGULAR, unit="rad/s"),
+    "manipulability": partial(draw_manipulability, rows=_LINEAR, unit="(m/s)³"),
+    "angular-manipulability": partial(draw_manipulability, rows=_ANGULAR, unit="(rad/s)³"),
+    "disagreement": draw_disagreement,
 }
 
 #: Suffix that follows "rad" or "m" in the unit of q, v or a.
@@ -135,16 +135,18 @@ _PER = {"q": "", "v": "/s", "a": "/s²"}
 COORDINATES = tuple(_PER)
 
 
-def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
+def make_coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
     units = np.array(configuration.units(robot.tree, what))
     return [
-        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
+        partial(
+            _draw_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64)
+        )
         for unit in ("rad", "m", "")
         if (units == unit).any()
     ]
 
 
-def _coordinates(
+def _draw_coordinates(
     robot: Robot,
     trajectory: Trajectory,
     what: str,
@@ -165,14 +167,14 @@ def _coordinates(
     for i in others:
         count = f"{len(others)} {'others' if named else 'joints'}" if i == others[0] else ""
         axes.plot(t, values[:, i], color=_UNNAMED, linewidth=0.7, label=count)
-    _lines(
+    _draw_lines(
         axes, t, values[:, named],
         [names[i] if k < _MOST_NAMES else "" for k, i in enumerate(named)],
     )  # fmt: skip
     bounds = {i: [x for x in _limits(robot, what, i) if np.isfinite(x)] for i in named}
     for k, i in enumerate(named):
         for bound in bounds[i]:
-            axes.axhline(bound, linewidth=0.6, **_look(k))
+            axes.axhline(bound, linewidth=0.6, **_line_style(k))
     crosses = "outside the limits"
     for i, mask in outside.items():
         axes.plot(t[mask], values[mask, i], "x", color=BAD, markersize=3.0, label=crosses)
@@ -207,14 +209,14 @@ _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
 #: Width of a legend entry without its text, as a number of letters.
 _HANDLE = 8
-_RATES_UNCHECKED = (
+_VELOCITIES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )
 
 
-def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
+def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
     """Return a figure with the named panels of `COORDINATES` and `PANELS`, or with all panels by default."""
-    drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
+    drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)
     height = _PANEL_HEIGHT * max(2, rows) + _TEXT_HEIGHT
@@ -243,17 +245,17 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
         title = label(f"{robot.name}: {x.frame}, {x.reference.name}")
-        figure.suptitle(f"{title}\n{_ends(x, trajectory)}", fontsize=10)
-        words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * width))
+        figure.suptitle(f"{title}\n{_path_text(x, trajectory)}", fontsize=10)
+        words = textwrap.wrap(label(caption(x, trajectory)), width=int(_LETTERS * width))
         figure.supxlabel("\n".join(words), fontsize=7, color="#444444")
     return figure
 
 
-def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
+def _select_panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
     found = list[Panel]()
     for name in names:
         if name in COORDINATES:
-            found += coordinate_panels(robot, trajectory, name)
+            found += make_coordinate_panels(robot, trajectory, name)
         elif name in PANELS:
             found.append(PANELS[name])
         else:
@@ -261,14 +263,14 @@ def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[
     return found
 
 
-def _ends(x: FrameMotion, trajectory: Trajectory) -> str:
+def _path_text(x: FrameMotion, trajectory: Trajectory) -> str:
     start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
     return f"from ({start}) to ({end}) m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
 
 
-def foot(x: FrameMotion, trajectory: Trajectory) -> str:
+def caption(x: FrameMotion, trajectory: Trajectory) -> str:
     """Return one line: the result of the check, and how v and a were computed."""
-    rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
+    rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_VELOCITIES_UNCHECKED}")
     if x.not_verified is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"
     worst = max(float(np.max(check.units, initial=0.0)) for check in x.checks.values())

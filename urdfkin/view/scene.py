@@ -27,7 +27,7 @@ LARGEST_FILE = 200_000_000
 
 
 @lru_cache(maxsize=256)
-def _read(file: Path) -> Any:
+def _load_mesh(file: Path) -> Any:
     import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
@@ -45,14 +45,14 @@ def _read(file: Path) -> Any:
     return trimesh.load(data, file_type=kind, resolver=SameFolder(str(file)), force="scene", process=False)
 
 
-def mesh(shape: Shape) -> Any | None:
+def make_mesh(shape: Shape) -> Any | None:
     """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame; None if unreadable."""
     import trimesh
 
     if shape.file is None:
         return None
     try:
-        whole = _read(shape.file).to_mesh().copy()
+        whole = _load_mesh(shape.file).to_mesh().copy()
     except Exception:
         return None
     if not isinstance(whole, trimesh.Trimesh) or not len(whole.faces):
@@ -69,7 +69,7 @@ def corners(shape: Shape) -> FloatArray:
     """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
-        lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
+        lower, upper = make_mesh(shape).bounds  # type: ignore[union-attr]
         return np.asarray(0.5 * (lower + upper) + 0.5 * signs * (upper - lower))
     size = np.array(shape.size)
     half = size / 2.0 if shape.kind == "box" else np.array([size[0], size[0], size[-1]])
@@ -101,7 +101,7 @@ class Shape:
     address: str = ""
 
     @property
-    def missing(self) -> bool:
+    def is_missing(self) -> bool:
         return self.kind == "mesh" and self.file is None
 
 

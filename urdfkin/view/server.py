@@ -54,7 +54,7 @@ def has_screen() -> bool:
 
 
 @contextmanager
-def opened_page(address: str) -> Iterator[None]:
+def open_page(address: str) -> Iterator[None]:
     """Open the address in the user's browser, by a temporary file that redirects to the address."""
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # Only this user can read the folder.
         page = Path(folder) / "view.html"
@@ -204,7 +204,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     _require_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
     # Viser would print its address without the key.
-    with _filtered(_process_request(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
+    with _filter_requests(_process_request(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
         _remove_handlers(server)
@@ -284,7 +284,7 @@ def _page() -> Callable[[str], bytes]:
 
 
 @contextlib.contextmanager
-def _filtered(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
+def _filter_requests(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
     """Return a context in which each new server checks requests with `process_request` and logs nothing."""
     from websockets.asyncio import server as module
 

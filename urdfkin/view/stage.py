@@ -23,7 +23,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.dh_drawing import row_corners
-from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
+from urdfkin.view.scene import GREY, Shape, corners, make_mesh, shapes
 
 #: Colours of the parts of the acceleration: red, green and blue from 0 to 255.
 PART_COLOURS = {
@@ -35,7 +35,7 @@ PART_COLOURS = {
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
 #: Length of the longest arrow, as a fraction of the robot's size.
-_SHARE = 0.3
+_ARROW_FRACTION = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def _arrows(
 ) -> Arrows:
     start = np.broadcast_to(x.placement[0, :3, 3], vectors.shape)
     largest = float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
-    scale = _SHARE * reach / largest if largest > 0.0 else 0.0
+    scale = _ARROW_FRACTION * reach / largest if largest > 0.0 else 0.0
     points = np.stack([start, start + scale * vectors], axis=1)
     return Arrows(points, np.array(colours, dtype=np.uint8).reshape(-1, 3), names)
 
@@ -104,12 +104,12 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
     U, s, _ = np.linalg.svd(full)
     U = U * np.array([1.0, 1.0, np.sign(np.linalg.det(U))])
     largest = float(s[0])
-    half = _SHARE * reach * (s / largest if largest > 0.0 else np.zeros(3))
+    half = _ARROW_FRACTION * reach * (s / largest if largest > 0.0 else np.zeros(3))
     half = np.maximum(half, 0.002 * reach)  # A small thickness keeps a flat ellipsoid visible.
-    return Ellipsoid(half, x.placement[0, :3, 3], scalar_first(U))
+    return Ellipsoid(half, x.placement[0, :3, 3], quaternions_scalar_first(U))
 
 
-def scalar_first(R: FloatArray) -> FloatArray:
+def quaternions_scalar_first(R: FloatArray) -> FloatArray:
     """Return the quaternions (..., 4) of rotations in viser's order w, x, y, z."""
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
@@ -118,7 +118,7 @@ def scalar_first(R: FloatArray) -> FloatArray:
 _OPENING = 15.0
 _TO_CAMERA = np.array([1.1, -1.3, 0.6])
 #: Fraction of the view that the robot fills.
-_FILLED = 0.85
+_FILLED_FRACTION = 0.85
 #: Viser's vertical field of view (rad).
 _FOV = np.deg2rad(75.0)
 
@@ -133,7 +133,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     up = np.cross(back, right)
-    height = _FILLED * np.tan(0.5 * fov)
+    height = _FILLED_FRACTION * np.tan(0.5 * fov)
     x, y, z = np.abs((points - middle) @ right), np.abs((points - middle) @ up), (points - middle) @ back
     distance = float(np.max(z + np.maximum(x / (height * aspect), y / height)))
     return middle + max(distance, 0.1) * back, middle
@@ -166,7 +166,7 @@ class Stage:
         self._links = [self._scene.add_frame(f"/robot/{i}", show_axes=False) for i in range(len(tree.links))]
         self._axes = self._scene.add_batched_axes(
             "/axes",
-            batched_wxyzs=scalar_first(Ts[:, :3, :3]),
+            batched_wxyzs=quaternions_scalar_first(Ts[:, :3, :3]),
             batched_positions=Ts[:, :3, 3],
             axes_length=0.07 * self.reach,
             axes_radius=0.0015 * self.reach,
@@ -181,10 +181,10 @@ class Stage:
         self._add_skeleton(tree)
         self.show(shapes=SOLID, skeleton=needs_skeleton, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
-        self.fill(Ts[np.newaxis])
+        self.fit_cameras(Ts[np.newaxis])
         server.on_client_connect(self._welcome)
 
-    def fill(self, Ts: FloatArray) -> None:
+    def fit_cameras(self, Ts: FloatArray) -> None:
         """Set the camera to show the robot in n configurations; Ts (n, links, 4, 4) are link placements."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
@@ -211,9 +211,12 @@ class Stage:
 
     def _add_shape(self, name: str, shape: Shape) -> Any | None:
         if shape.kind == "mesh":
-            whole = mesh(shape)
+            whole = make_mesh(shape)
             return None if whole is None else self._scene.add_mesh_trimesh(name, whole)
-        pose = {"wxyz": scalar_first(shape.T_link_shape[:3, :3]), "position": shape.T_link_shape[:3, 3]}
+        pose = {
+            "wxyz": quaternions_scalar_first(shape.T_link_shape[:3, :3]),
+            "position": shape.T_link_shape[:3, 3],
+        }
         *rgb, opacity = shape.colour or GREY
         look = {"color": tuple(round(255 * x) for x in rgb), "opacity": None if opacity == 1.0 else opacity}
         if shape.kind == "box":
@@ -227,7 +230,7 @@ class Stage:
 
         def add(name: str, axis: FloatArray, radius: float, height: float, color: Any, p: FloatArray) -> None:
             look = {"radius": radius, "height": height, "color": color}
-            pose = {"wxyz": scalar_first(_towards(axis)), "position": p}
+            pose = {"wxyz": quaternions_scalar_first(_towards(axis)), "position": p}
             self._skeleton.append(self._scene.add_cylinder(f"/robot/{name}", **look, **pose))
 
         for i, joint in enumerate(tree.joints):
@@ -260,7 +263,7 @@ class Stage:
             name = f"{solid.name}-transparent"
             if shape.kind != "mesh":
                 copies.append(self._add_shape(name, replace(shape, colour=(*GREY[:3], _OPACITY))))
-            elif (whole := mesh(shape)) is not None:
+            elif (whole := make_mesh(shape)) is not None:
                 look = {"color": tuple(round(255 * x) for x in GREY[:3]), "opacity": _OPACITY}
                 copies.append(self._scene.add_mesh_simple(name, whole.vertices, whole.faces, **look))
         return copies
@@ -306,7 +309,7 @@ class Stage:
 
     def move(self, Ts: FloatArray) -> None:
         """Move the links to the placements (links, 4, 4)."""
-        wxyzs, positions = scalar_first(Ts[:, :3, :3]), Ts[:, :3, 3]
+        wxyzs, positions = quaternions_scalar_first(Ts[:, :3, :3]), Ts[:, :3, 3]
         with self._server.atomic():
             for link, wxyz, position in zip(self._links, wxyzs, positions, strict=True):
                 link.wxyz, link.position = wxyz, position
@@ -314,7 +317,7 @@ class Stage:
 
     # -- overlays ------------------------------------------------------------------------------------
 
-    def arrows(self, name: str, arrows: Arrows | None) -> None:
+    def draw_arrows(self, name: str, arrows: Arrows | None) -> None:
         size = 0.008 * self.reach
         visible = arrows is not None and len(arrows.points) > 0
         self._scene.add_arrows(
@@ -327,7 +330,7 @@ class Stage:
             visible=visible,
         )
 
-    def ellipsoid(self, shape: Ellipsoid | None) -> None:
+    def draw_ellipsoid(self, shape: Ellipsoid | None) -> None:
         self._scene.add_icosphere(
             "/ellipsoid",
             radius=1.0,
@@ -339,7 +342,7 @@ class Stage:
             visible=shape is not None,
         )
 
-    def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
+    def draw_table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
         for handle in self._dh:
             handle.remove()
         self._dh = []
@@ -351,7 +354,7 @@ class Stage:
         first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
         axes = self._scene.add_batched_axes(
             "/dh/frames",
-            batched_wxyzs=scalar_first(frames[:, :3, :3]),
+            batched_wxyzs=quaternions_scalar_first(frames[:, :3, :3]),
             batched_positions=frames[:, :3, 3],
             axes_length=0.1 * self.reach,
             axes_radius=0.0035 * self.reach,

@@ -58,9 +58,9 @@ class SliderRow:
     `turns` is True if the number is an angle or a derivative of an angle.
     """
 
-    at: int
+    index: int
     name: str
-    turns: bool
+    is_angle: bool
     lower: float
     upper: float
 
@@ -68,14 +68,26 @@ class SliderRow:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The text `per` follows the unit: "" for q, "/s" for v, "/s²" for a. When the user moves a slider, `report`
-    is called with the index and the new number. `report` is not called when the program sets a slider.
+    The text `unit_suffix` follows the unit: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
+    `on_change` is called with the index and the new number. `on_change` is not called when the program sets
+    a slider.
     """
 
     def __init__(
-        self, gui: Any, folder: Any, rows: Iterable[SliderRow], per: str, report: Callable[[int, float], None]
+        self,
+        gui: Any,
+        folder: Any,
+        rows: Iterable[SliderRow],
+        unit_suffix: str,
+        on_change: Callable[[int, float], None],
     ) -> None:
-        self._gui, self._folder, self.rows, self._per, self._report = gui, folder, list(rows), per, report
+        self._gui, self._folder, self.rows, self._unit_suffix, self._on_change = (
+            gui,
+            folder,
+            list(rows),
+            unit_suffix,
+            on_change,
+        )
         self._is_setting = False
         self.handles: list[Any] = []
 
@@ -86,16 +98,16 @@ class Sliders:
         self._degrees = degrees
         with self._folder:
             self.handles = [
-                self._slider(row, float(values[row.at]), order)
+                self._slider(row, float(values[row.index]), order)
                 for row, order in zip(self.rows, orders, strict=True)
             ]
 
     def _slider(self, row: SliderRow, value: float, order: float | None) -> Any:
         scale = self._scale(row)
         lower, upper = self._range(row, value)
-        unit = ("deg" if self._degrees else "rad") if row.turns else "m"
+        unit = ("deg" if self._degrees else "rad") if row.is_angle else "m"
         handle = self._gui.add_slider(
-            f"{row.name} [{unit}{self._per}]",
+            f"{row.name} [{unit}{self._unit_suffix}]",
             min=scale * lower,
             max=scale * upper,
             step=self._step(row, upper - lower),
@@ -103,19 +115,19 @@ class Sliders:
             marks=_marks(scale * lower, scale * upper),
             order=order,
         )
-        handle.precision = _DIGITS_OF_DEGREES if row.turns and self._degrees else _DIGITS
+        handle.precision = _DIGITS_OF_DEGREES if row.is_angle and self._degrees else _DIGITS
         handle.on_update(lambda _: self._on_update(row, handle))
         return handle
 
     def _on_update(self, row: SliderRow, handle: Any) -> None:
         if not self._is_setting:
-            self._report(row.at, float(handle.value) / self._scale(row))
+            self._on_change(row.index, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
         self._is_setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
-                value, scale = float(values[row.at]), self._scale(row)
+                value, scale = float(values[row.index]), self._scale(row)
                 lower, upper = (scale * end for end in self._range(row, value))
                 if (handle.min, handle.max) != (lower, upper):
                     handle.min, handle.max = lower, upper
@@ -131,10 +143,10 @@ class Sliders:
             self._is_setting = False
 
     def _scale(self, row: SliderRow) -> float:
-        return math.degrees(1.0) if row.turns and self._degrees else 1.0
+        return math.degrees(1.0) if row.is_angle and self._degrees else 1.0
 
     def _step(self, row: SliderRow, width: float) -> float:
-        if row.turns:
+        if row.is_angle:
             return _DEGREES if self._degrees else _RADIANS
         size = width / _STEPS
         power = 10.0 ** math.floor(math.log10(size))
@@ -155,7 +167,7 @@ def coordinate_rows(robot: Robot) -> list[SliderRow]:
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
-            turns = _turns(joint, k)
+            turns = _is_angle(joint, k)
             lower, upper = _limits(joint, math.pi if turns else 1.0)
             if upper > lower:
                 rows.append(SliderRow(at + k, robot.coordinate_names[at + k], turns, lower, upper))
@@ -167,19 +179,19 @@ def fixed_coordinates(robot: Robot) -> list[str]:
     return [robot.coordinate_names[i] for i in np.flatnonzero(lower == upper)]
 
 
-def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
+def velocity_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
             most = _ACCELERATION if second else _VELOCITY
             if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED:
                 most = joint.limit.velocity
-            turns = k >= 3 if joint.nv == 6 else _turns(joint, k)
+            turns = k >= 3 if joint.nv == 6 else _is_angle(joint, k)
             rows.append(SliderRow(at + k, robot.velocity_names[at + k], turns, -most, most))
     return rows
 
 
-def _turns(joint: Joint, k: int) -> bool:
+def _is_angle(joint: Joint, k: int) -> bool:
     return joint.kind.turns or (joint.nv == 3 and k == 2)
 
 
@@ -194,17 +206,17 @@ def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
     out = np.array(q, dtype=np.float64)
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
-            lower, upper = _limits(joint, math.pi if _turns(joint, k) else 1.0)
+            lower, upper = _limits(joint, math.pi if _is_angle(joint, k) else 1.0)
             out[at + k] = min(max(out[at + k], lower), upper)
     return out
 
 
-def written(values: FloatArray) -> str:
+def format_values(values: FloatArray) -> str:
     """Return numbers as text without loss of digits, in a form that `--q` and `set_q` read."""
     return ",".join(repr(float(value)) for value in values)
 
 
-def numbers(x: FrameMotion) -> str:
+def describe_motion(x: FrameMotion) -> str:
     rows = [
         ("position", "m", x.placement[0, :3, 3]),
         ("velocity", "m/s", x.velocity[0, :3]),
@@ -288,23 +300,23 @@ class Viewer:
         self._lock = threading.RLock()
         self.player: Player | None = None
         self._build(trajectory)
-        self._fill()
+        self._fit_cameras()
         self._write_q()
         self.update()
         if self.player is not None:
             self.player.check()
             self.player.show(0)
 
-    def _fill(self) -> None:
+    def _fit_cameras(self) -> None:
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
             q = np.concatenate([q, samples[np.linspace(0, len(samples) - 1, 50).astype(int)]])
-        self.stage.fill(self.robot.placement(q, self.robot.link_frames, verify=False))
+        self.stage.fit_cameras(self.robot.placement(q, self.robot.link_frames, verify=False))
 
     def _reset_camera(self) -> None:
         with self._lock:
-            self._fill()
+            self._fit_cameras()
             self.stage.reset_cameras()
 
     @property
@@ -355,7 +367,7 @@ class Viewer:
             self.ellipsoid = gui.add_dropdown("velocity ellipsoid", ("none", "linear", "angular"))
             self.parts = gui.add_checkbox("acceleration's parts", initial_value=False)
             gui.add_markdown(legend())
-        self._build_rates()
+        self._build_velocities()
         for handle in (self.frame, self.reference):
             handle.on_update(lambda _: self._choose())
         self.dh.on_update(lambda _: self._choose_convention())
@@ -370,20 +382,20 @@ class Viewer:
         camera.on_click(lambda _: self._reset_camera())
         picture.on_click(lambda event: self._save(event.client))
 
-    def _build_rates(self) -> None:
+    def _build_velocities(self) -> None:
         gui, robot = self.server.gui, self.robot
         with gui.add_folder("Joint velocities, accelerations", expand_by_default=False):
             rest, random = gui.add_button("at rest"), gui.add_button("random")
             first = gui.add_folder("v, joint velocities", expand_by_default=True)
             second = gui.add_folder("a, joint accelerations", expand_by_default=False)
-        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", partial(self._move, "v"))
+        self.rates = Sliders(gui, first, velocity_rows(robot, second=False), "/s", partial(self._move, "v"))
         self.second_rates = Sliders(
-            gui, second, rate_rows(robot, second=True), "/s²", partial(self._move, "a")
+            gui, second, velocity_rows(robot, second=True), "/s²", partial(self._move, "a")
         )
         for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
             sliders.build(values, degrees=True)
-        rest.on_click(lambda _: self.set_rates(np.zeros(robot.nv), np.zeros(robot.nv)))
-        random.on_click(lambda _: self.set_rates(*self._rng.uniform(-1.0, 1.0, (2, robot.nv))))
+        rest.on_click(lambda _: self.set_velocities(np.zeros(robot.nv), np.zeros(robot.nv)))
+        random.on_click(lambda _: self.set_velocities(*self._rng.uniform(-1.0, 1.0, (2, robot.nv))))
 
     def _tip(self) -> str:
         tip = self.robot.tip_frame
@@ -402,7 +414,7 @@ class Viewer:
         with self._lock:
             self.set_state(parse_finite(self.robot.tree, q, "q"), self.v, self.a)
 
-    def set_rates(self, v: FloatArray, a: FloatArray) -> None:
+    def set_velocities(self, v: FloatArray, a: FloatArray) -> None:
         with self._lock:
             self.v, self.a = v, a
             self.rates.show(v)
@@ -427,7 +439,9 @@ class Viewer:
             client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
 
     def _write_q(self) -> None:
-        self.words_of_q.value = written(self.q if self._conversion is None else self._conversion.to(self.q))
+        self.words_of_q.value = format_values(
+            self.q if self._conversion is None else self._conversion.to(self.q)
+        )
         self.wrong.content = ""
 
     def _read_q(self, event: Any) -> None:
@@ -484,7 +498,7 @@ class Viewer:
             self.motion = self._motion(Reference.of(self.reference.value))
             aligned = Reference.LOCAL_WORLD_ALIGNED
             drawn = self.motion if self.motion.reference is aligned else self._motion(aligned)
-            self.words.content = numbers(self.motion)
+            self.words.content = describe_motion(self.motion)
             self.stage.show(
                 shapes=self.shapes.value,
                 skeleton=self.skeleton.value,
@@ -501,16 +515,16 @@ class Viewer:
     def _draw(self, x: FrameMotion) -> None:
         stage, reach, rates = self.stage, self.stage.reach, self.robot.velocity_names
         columns, ellipsoid = self.columns.value, self.ellipsoid.value
-        stage.arrows(
+        stage.draw_arrows(
             "jacobian",
             None if columns == "none" else jacobian_arrows(x, rates, reach, angular=columns == "angular"),
         )
-        stage.ellipsoid(
+        stage.draw_ellipsoid(
             None if ellipsoid == "none" else velocity_ellipsoid(x, reach, angular=ellipsoid == "angular")
         )
-        stage.arrows("acceleration", acceleration_arrows(x, reach) if self.parts.value else None)
+        stage.draw_arrows("acceleration", acceleration_arrows(x, reach) if self.parts.value else None)
         if self._table is None:
-            stage.table(None, self.q, np.eye(4))
+            stage.draw_table(None, self.q, np.eye(4))
         else:
             base = self.robot.placement(self.q, self._table.base_frame, verify=False)
-            stage.table(self._table, self.robot.select(self._table, self.q), base)
+            stage.draw_table(self._table, self.robot.select(self._table, self.q), base)

@@ -14,7 +14,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
 from urdfkin.robot.trajectory import Trajectory, line
 from urdfkin.view.figure import save
-from urdfkin.view.plot import COORDINATES, PANELS, _look, foot, sheet
+from urdfkin.view.plot import COORDINATES, PANELS, _line_style, caption, plot_motion
 
 pytest.importorskip("matplotlib")
 Case = tuple[Robot, FrameMotion, Trajectory]
@@ -29,20 +29,20 @@ def case() -> Case:
 
 def test_the_title_states_start_and_end_and_every_panel_is_available(case: Case, tmp_path: Path) -> None:
     assert (*COORDINATES, *PANELS) == OFFERED
-    assert len({tuple(_look(k).values()) for k in range(14)}) == 14
+    assert len({tuple(_line_style(k).values()) for k in range(14)}) == 14
     robot, x, trajectory = case
-    title = sheet(robot, x, trajectory, ["position"]).get_suptitle()
+    title = plot_motion(robot, x, trajectory, ["position"]).get_suptitle()
     start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
     assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
     with pytest.raises(InputError, match="unknown picture format"):
-        save(sheet(*case, ["position"]), tmp_path / "a.bmp")
+        save(plot_motion(*case, ["position"]), tmp_path / "a.bmp")
     with pytest.raises(UnknownNameError, match="velocity"):
-        sheet(*case, ["velocty"])
+        plot_motion(*case, ["velocty"])
 
 
 def test_the_plotted_lines_have_the_values_of_the_motion(case: Case) -> None:
     robot, x, trajectory = case
-    figure = sheet(robot, x, trajectory, ["velocity", "parts"])
+    figure = plot_motion(robot, x, trajectory, ["velocity", "parts"])
     velocity, parts = figure.axes
     for k, drawn in enumerate(velocity.lines):
         np.testing.assert_array_equal(drawn.get_ydata(), x.velocity[:, k])
@@ -53,7 +53,7 @@ def test_the_plotted_lines_have_the_values_of_the_motion(case: Case) -> None:
 
 def test_q_and_v_are_plotted_with_limits_and_one_unit_for_each_axis(case: Case) -> None:
     robot, x, trajectory = case
-    axes = sheet(robot, x, trajectory, ["q", "v", "a"]).axes
+    axes = plot_motion(robot, x, trajectory, ["q", "v", "a"]).axes
     assert [one.get_ylabel().split("\n")[0] for one in axes] == [
         "q [rad]", "q [m]", "v [rad/s]", "v [m/s]", "a [rad/s²]", "a [m/s²]"
     ]  # fmt: skip
@@ -76,7 +76,7 @@ def _of(bounds: Any) -> tuple[set[float], set[float]]:
 def test_long_legends_do_not_make_the_panels_narrower() -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
-    figure = sheet(robot, frame_motion(robot, x, "FL_foot"), x)
+    figure = plot_motion(robot, frame_motion(robot, x, "FL_foot"), x)
     figure.draw_without_rendering()
     assert min(axes.get_position().width for axes in figure.axes) > 0.72 / 3
     for axes in figure.axes:
@@ -91,7 +91,7 @@ def test_the_legend_names_joints_outside_the_limits_and_counts_the_others() -> N
     far = [robot.coordinate_names.index(name) for name in ("LElbowYaw", "RWristPitch")]
     end[far] = robot.limits[1, far] + 0.5
     x = line(robot, robot.neutral(), end, 1.0, 11)
-    (axes, *_) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
+    (axes, *_) = plot_motion(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     legend = axes.get_legend()
     assert legend is not None
     words = [text.get_text() for text in legend.get_texts()]
@@ -100,7 +100,7 @@ def test_the_legend_names_joints_outside_the_limits_and_counts_the_others() -> N
 
 @pytest.mark.parametrize("panels", [[], ["q"], ["position", "velocity", "disagreement"]])
 def test_a_plot_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case: Case) -> None:
-    figure = sheet(*case, panels)
+    figure = plot_motion(*case, panels)
     width, height = figure.get_size_inches()
     assert width <= 7.6  # A4 is 8.27 by 11.69 inches, US Letter 8.5 by 11
     assert height <= 10.4
@@ -114,12 +114,12 @@ def test_a_plot_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case
 def test_crosses_mark_limit_violations_and_disagreements_are_plotted_with_the_bound(case: Case) -> None:
     robot, motion, trajectory = case
     x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
-    (axes, _) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
+    (axes, _) = plot_motion(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
     outside = x.q[:, 3] > robot.limits[1, 3]
     assert outside.any()
     np.testing.assert_array_equal(crosses.get_ydata(), x.q[outside, 3])
-    (bounded,) = sheet(robot, motion, trajectory, ["disagreement"]).axes
+    (bounded,) = plot_motion(robot, motion, trajectory, ["disagreement"]).axes
     for check in motion.checks.values():
         assert (check.bound > 0.0).all()
         np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
@@ -130,7 +130,7 @@ def test_crosses_mark_limit_violations_and_disagreements_are_plotted_with_the_bo
 def test_no_axis_of_a_plot_mixes_metres_and_radians(case: Case) -> None:
     robot, x, trajectory = case
     names = ["singular-values", "angular-singular-values", "manipulability", "angular-manipulability"]
-    figure = sheet(robot, x, trajectory, names)
+    figure = plot_motion(robot, x, trajectory, names)
     J = x.jacobian
     for axes, rows in zip(figure.axes[:2], (slice(0, 3), slice(3, 6)), strict=True):
         drawn = np.array([one.get_ydata() for one in axes.lines]).T
@@ -146,21 +146,21 @@ def test_a_floating_base_is_plotted_with_position_and_quaternion(tmp_path: Path)
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     motion = frame_motion(robot, x, "FL_foot")
     assert motion.agrees
-    *axes, _ = sheet(robot, motion, x, ["q", "v"]).axes
+    *axes, _ = plot_motion(robot, motion, x, ["q", "v"]).axes
     assert [one.get_ylabel().split("\n")[0] for one in axes] == [
         "q [rad]", "q [m]", "q [quaternion]", "v [rad/s]", "v [m/s]"
     ]  # fmt: skip
-    assert save(sheet(robot, motion, x), tmp_path / "a.svg")
+    assert save(plot_motion(robot, motion, x), tmp_path / "a.svg")
 
 
 @pytest.mark.slow
 def test_a_plot_contains_every_panel_and_a_footer_about_the_verification(case: Case, tmp_path: Path) -> None:
     robot, x, trajectory = case
-    written = "".join(ET.fromstring(save(sheet(robot, x, trajectory), tmp_path / "a.svg")).itertext())
+    written = "".join(ET.fromstring(save(plot_motion(robot, x, trajectory), tmp_path / "a.svg")).itertext())
     panels = "position", "velocity", "parts", "singular", "manipulability", "disagreement"
     for words in (*panels, "verified by"):
         assert words in written
-    assert foot(x, trajectory) in written
+    assert caption(x, trajectory) in written
 
 
 @pytest.mark.slow
@@ -168,6 +168,6 @@ def test_a_plot_contains_every_panel_and_a_footer_about_the_verification(case: C
 def test_the_suffix_selects_the_picture_format_and_equal_motions_give_equal_files(
     ending: str, head: bytes, case: Case, tmp_path: Path
 ) -> None:
-    files = [save(sheet(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]
+    files = [save(plot_motion(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]
     assert files[0].startswith(head)
     assert files[0] == files[1]
