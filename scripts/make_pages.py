@@ -23,7 +23,7 @@ import urdfkin
 from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.kinematics.registry import table as equations
 from urdfkin.model.configuration import draw_base
 from urdfkin.report.words import more_accurate_counts
@@ -209,7 +209,7 @@ LENGTHS = (3, 10, 30, 100)
 def enclosures() -> dict[str, str]:
     heads = ("robot", "joints", "digits", "widest, steps", "urdfkin inside", "Pinocchio inside", "ms")
     long = ("joints", "digits", "acceleration", "widest interval", "ms")
-    with only("compiled"):
+    with use_only("compiled"):
         robots = table(heads, _of_robots(), left=1)
         return {
             "robots": f"{ENCLOSED} samples, Pinocchio {version()}:\n\n{robots}",

@@ -85,7 +85,7 @@ CASES = {
         """,
     "a kernel, while another thread compiles one": """
         from urdfkin.compiled import kernel_cache
-        held(kernel_cache.compiling)
+        held(kernel_cache.compile_lock)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """
@@ -113,10 +113,10 @@ CASES = {
         """,
     "a robot, while another thread needs the lock of logging during an import": """
         import logging
-        from urdfkin.system.locks import importing
+        from urdfkin.system.locks import import_lock
         has = threading.Event()
         def work():
-            with importing:
+            with import_lock:
                 has.set()
                 time.sleep(1.0)
                 logging.getLogger("of a module that is imported")

@@ -152,13 +152,13 @@ def test_the_number_of_parts_is_limited_by_the_batch_and_the_processors(
 ) -> None:
     # Ten million threads once caused ten million parts, which took 3.5 s.
     counted = []
-    parts = evaluate._parts
+    parts = evaluate._split_rows
 
     def counting(n: int, threads: int) -> list[slice]:
         counted.append(threads)
         return parts(n, threads)
 
-    monkeypatch.setattr(evaluate, "_parts", counting)
+    monkeypatch.setattr(evaluate, "_split_rows", counting)
     q = robot.sample(1000)
     many = robot.jacobian(q, "c", verify=False, threads=10**7)
     np.testing.assert_array_equal(many, robot.jacobian(q, "c", verify=False, threads=1))

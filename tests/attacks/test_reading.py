@@ -22,7 +22,7 @@ from tests.cli.test_check_in_a_repository import commit, git, put
 from urdfkin.errors import SourceError
 from urdfkin.robot.trajectory import read_arrays
 from urdfkin.system import files
-from urdfkin.system.cache import get
+from urdfkin.system.cache import read_cached_file
 from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
@@ -125,7 +125,7 @@ def test_a_manifest_or_a_cached_file_that_is_a_device_and_an_mjcf_file_that_is_a
     assert find_package("arm", tmp_path / "arm.urdf", {}) is None
     (tmp_path / "kernel").symlink_to("/dev/zero")
     with pytest.warns(UserWarning, match="is damaged and is computed again: a character device"):
-        assert get(tmp_path / "kernel") is None
+        assert read_cached_file(tmp_path / "kernel") is None
     os.mkfifo(tmp_path / "arm.xml")
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 

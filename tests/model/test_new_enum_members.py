@@ -13,7 +13,7 @@ import urdfkin
 from urdfkin.cli.options import REFERENCES
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
-from urdfkin.compiled.machine.single import single
+from urdfkin.compiled.machine.single import make_single_evaluator
 from urdfkin.compiled.plan import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.export.function import function_of
@@ -84,7 +84,7 @@ def test_functions_for_single_configurations_refuse_a_new_reference_frame(
     plan: Any, reference: Reference, name: str
 ) -> None:
     with pytest.raises(REFUSED):
-        single(name.replace(" ", "_"), plan, reference)
+        make_single_evaluator(name.replace(" ", "_"), plan, reference)
 
 
 def test_the_breakdown_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:

@@ -16,7 +16,7 @@ from scripts.check_bits import WAYS
 from tests.cli.running import urdfkin as command
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
 from urdfkin.model.configuration import draw, draw_base, special
@@ -189,7 +189,7 @@ def test_coupled_columns_are_the_product_with_g_to_the_last_bit(data: st.DataObj
         for column in columns:
             expected[..., index[column]] += J[..., column] * factor[column]
     for way in WAYS:
-        with only(way):
+        with use_only(way):
             np.testing.assert_array_equal(coupled(J, columns, index, factor, nv), expected)
 
 

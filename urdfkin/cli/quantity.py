@@ -286,7 +286,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    from urdfkin.compiled.breakdown import KINDS
+    from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 
     heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
 
@@ -313,7 +313,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def data() -> dict[str, Any]:
         about = {"quantity": "acceleration breakdown", "frame": x.frame, "reference": reference}
-        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(KINDS)}
+        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(ACCELERATION_KINDS)}
         return _head(x, "qva", **about, **axes) | {
             name: getattr(found, name).tolist() for name in ("base", "terms", "total")
         }

@@ -26,10 +26,10 @@ from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import in_blocks, is_staged
-from urdfkin.compiled.kernel_cache import compiling
-from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
-from urdfkin.compiled.prepared import Fast
+from urdfkin.compiled.evaluate import compute_in_blocks, uses_buffer
+from urdfkin.compiled.kernel_cache import compile_lock
+from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
+from urdfkin.compiled.prepared import FastFunction
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import InputLayout, advance, c_file, fill_template, reserve
 from urdfkin.export.code import FrameCode, unverified_code
@@ -38,8 +38,8 @@ from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.cache import cache_folder, get, put
-from urdfkin.system.locks import importing, lock_over_forks
+from urdfkin.system.cache import make_cache_folder, read_cached_file, write_cached_file
+from urdfkin.system.locks import import_lock, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
@@ -65,12 +65,12 @@ def library(code: FrameCode) -> ctypes.CDLL:
         raise NoCompilerError("cc is not installed")
     text = c_file(code) + _entry_point(code)
     flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
-    folder = cache_folder("library", [], text, *flags, _version(compiler), _processor())
-    data = get(folder / "machine.code") if folder else None
+    folder = make_cache_folder("library", [], text, *flags, _version(compiler), _processor())
+    data = read_cached_file(folder / "machine.code") if folder else None
     if data is None:
         data = _compile(text, [compiler, *flags])
         if folder:
-            put(folder / "machine.code", data)
+            write_cached_file(folder / "machine.code", data)
     return _load(data)
 
 
@@ -96,7 +96,7 @@ def _entry_point(code: FrameCode) -> str:
         "library.c",
         N=int(KernelArgs.N),
         OUT=int(KernelArgs.OUT),
-        STAGE=int(KernelArgs.STAGE),
+        STAGE=int(KernelArgs.BUFFER),
         title=code.name,
         name=function.name,
         passed=", ".join(widths),
@@ -166,7 +166,7 @@ def _processor() -> str:
 _MOST_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
-    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
+    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.BUFFER, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
 _Arguments = ctypes.c_int64 * len(KernelArgs)
 _DOUBLE = np.dtype(np.float64)
@@ -220,12 +220,12 @@ class CompiledFrame:
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._batches: dict[str, Callable[[int], int] | None] = {}
         # The first call of each function compiles the machine code, or reads it from the cache.
-        self._placement: Fast = partial(self._first, "placement")
-        self._velocity: Fast = partial(self._first, "velocity")
-        self._jacobian: Fast = partial(self._first, "jacobian")
-        self._jacobian_rate: Fast = partial(self._first, "jacobian rate")
-        self._hessian: Fast = partial(self._first, "hessian")
-        self._acceleration: Fast = partial(self._first, "acceleration")
+        self._placement: FastFunction = partial(self._first, "placement")
+        self._velocity: FastFunction = partial(self._first, "velocity")
+        self._jacobian: FastFunction = partial(self._first, "jacobian")
+        self._jacobian_rate: FastFunction = partial(self._first, "jacobian rate")
+        self._hessian: FastFunction = partial(self._first, "hessian")
+        self._acceleration: FastFunction = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
         # Memory addresses are not valid in another process, so unpickling creates a new object.
@@ -316,17 +316,17 @@ class CompiledFrame:
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
-        with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called
+        with compile_lock, import_lock:
+            from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
         # The fast function checks neither the norm of a quaternion nor the range of the results.
         needs_checks = self._tree.floating_joints or self._plan.is_large
-        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
-        compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
+        compute, task = wrap_c_function(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
@@ -415,11 +415,11 @@ class CompiledFrame:
             arguments[_N], arguments[_OUT] = len(part), address(part)
             # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
             # Therefore the buffer `stage` has extra space.
-            stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
+            stage = aligned_empty(LANES * part[0].size + LANES) if row.columns and uses_buffer(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if in_blocks(compute, inputs, out, threads):
+        if compute_in_blocks(compute, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

@@ -46,7 +46,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
-from urdfkin.system.locks import importing
+from urdfkin.system.locks import import_lock
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, entry_of
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
@@ -191,7 +191,7 @@ class Robot(Displayable):
         return [name for name in super().__dir__() if name not in _INTERNAL]
 
     def _sheet(self) -> TextDocument:
-        with importing:
+        with import_lock:
             from urdfkin.system.plain_xml import order_words
 
         order = order_words(self.urdf, self.joint_names)
@@ -669,7 +669,7 @@ class Robot(Displayable):
         >>> isaaclab.to(a1.neutral()).shape
         (12,)
         """
-        with importing:
+        with import_lock:
             from urdfkin.model.conventions import Conversion, find_convention
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
@@ -686,7 +686,7 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.robot.convention_robot import ConventionRobot
 
         return ConventionRobot(self, self.convention(name, joints))
@@ -814,7 +814,7 @@ class Robot(Displayable):
         >>> arm.relative_placement([0.0, 0.0], "tip", "link_2")[:3, 3].tolist()
         [0.4, 0.0, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
@@ -1142,10 +1142,10 @@ class Robot(Displayable):
             except RepresentationSingularityError as error:
                 too_near.append((error.distance, part.start + error.sample[0]))
 
-        with importing:
-            from urdfkin.compiled.evaluate import in_parts
+        with import_lock:
+            from urdfkin.compiled.evaluate import compute_in_parts
 
-        in_parts(compute, call.n, threads)
+        compute_in_parts(compute, call.n, threads)
         if too_near:
             distance, k = min(too_near)
             raise RepresentationSingularityError(representation, distance, call.index(k))
@@ -1190,13 +1190,13 @@ class Robot(Displayable):
         joint_1  centripetal   -0.9      0      0      0      0      0
         sum                    -0.9      0      0      0      0      0
         """
-        with importing:
-            from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
+        with import_lock:
+            from urdfkin.compiled.breakdown import ACCELERATION_KINDS, AccelerationBreakdown, moving_joints
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.require_pinocchio(verify)
-        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
+        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(ACCELERATION_KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
             ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
@@ -1251,7 +1251,7 @@ class Robot(Displayable):
         >>> bool((proof.jacobian.error(J) < 4e-16).all())
         True
         """
-        with importing:
+        with import_lock:
             from urdfkin.verify.exact.enclosure import enclose
 
         frame = self._default_frame() if frame is None else frame
@@ -1285,7 +1285,7 @@ class Robot(Displayable):
         """
         frame = self._default_frame() if frame is None else frame
         prepared = self._prepare(frame, reference, verify=as_bool(verify, "verify"))
-        prepared.wanted = True
+        prepared.always_load = True
         return prepared
 
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
@@ -1309,7 +1309,7 @@ class Robot(Displayable):
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.export.compiled_frame import CompiledFrame
 
         frame = self._default_frame() if frame is None else frame
@@ -1396,7 +1396,7 @@ class Robot(Displayable):
         >>> "class Kinematics(torch.nn.Module):" in robot.export("torch", "tip")
         True
         """
-        with importing:
+        with import_lock:
             from urdfkin.export.python import need_torch, torch_module
 
         need_torch()
@@ -1504,7 +1504,7 @@ class Robot(Displayable):
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
-        with importing:
+        with import_lock:
             from urdfkin.dh.make import dh_table
             from urdfkin.dh.table import DHTable
 
@@ -1551,7 +1551,7 @@ class Robot(Displayable):
             >>> urdfkin.load("planar_two_link").screws("tip", "base").space[1].tolist()  # [w; v]
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.dh.screws import screws_of
             from urdfkin.verify.chain_checks import check_screws
 
@@ -1574,7 +1574,7 @@ class Robot(Displayable):
         >>> [(row.joint, row.d) for row in urdfkin.load("planar_two_link").tree_parameters().rows]
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
-        with importing:
+        with import_lock:
             from urdfkin.dh.tree_parameters import tree_parameters
 
         parameters = tree_parameters(self.tree)
@@ -1629,7 +1629,7 @@ class Robot(Displayable):
             base=call.state,
             out=to,
             threads=threads,
-            read=self.verifier.policy_of_call(verify) is True,
+            keep_in_cache=self.verifier.policy_of_call(verify) is True,
             **options,
         )
         result = call.in_shape(results) if out is None else out

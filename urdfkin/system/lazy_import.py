@@ -14,7 +14,7 @@ from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
-from urdfkin.system.locks import importing
+from urdfkin.system.locks import import_lock
 
 
 def lazy_import(home: str) -> Callable[..., Any]:
@@ -24,7 +24,7 @@ def lazy_import(home: str) -> Callable[..., Any]:
 
     def call(*arguments: Any, **options: Any) -> Any:
         if not imported:
-            with importing:
+            with import_lock:
                 imported.append(import_module(module))
         return get(imported[0])(*arguments, **options)
 

@@ -23,7 +23,7 @@ def lock_over_forks() -> threading.RLock:
 
     Use this function only for module variables, because this module stores each lock until the process ends.
     """
-    importing.register()
+    import_lock.register()
     lock = threading.RLock()
     _locks.append(lock)
     return lock
@@ -80,4 +80,4 @@ class _ImportLock:
         self._lock.release()
 
 
-importing = _ImportLock()
+import_lock = _ImportLock()

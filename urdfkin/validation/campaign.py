@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
-from urdfkin.compiled.preload import are_on_disk
+from urdfkin.compiled.preload import all_kernels_on_disk
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
@@ -229,7 +229,7 @@ _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
+    return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and all_kernels_on_disk())
 
 
 @dataclass

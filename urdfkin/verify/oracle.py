@@ -629,10 +629,10 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     kernel and NumPy return identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
-    if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
+    if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:
         begin = time.thread_time()
         sums = _coupled(rows, columns, index, factor, nv)
-        preload.spend("coupling", time.thread_time() - begin)
+        preload.add_time("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
     kernel(rows, columns, index, factor, out)

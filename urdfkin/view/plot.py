@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
@@ -65,8 +65,8 @@ def _rotation(x: FrameMotion) -> FloatArray:
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
-    used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
-    names = tuple(KINDS[k] for k in used)
+    used = [k for k in range(len(ACCELERATION_KINDS)) if sizes[:, k].any()]
+    names = tuple(ACCELERATION_KINDS[k] for k in used)
     _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
     axes.set_ylabel("norms of the parts [m/s²]")
 

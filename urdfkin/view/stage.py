@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.dh.table import DHConvention, DHTable
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.rotation import quaternion_of
@@ -76,7 +76,7 @@ def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
     """
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
-    names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
+    names = tuple(name for name, used in zip((*ACCELERATION_KINDS, "sum"), keep, strict=True) if used)
     return _arrows(x, parts[keep], [PART_COLOURS[name] for name in names], names, reach)
 
 

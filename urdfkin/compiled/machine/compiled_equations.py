@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from urdfkin.compiled.machine.compiling import compiled
+from urdfkin.compiled.machine.compiling import inline
 from urdfkin.kinematics.arithmetic import bound
 
-globals().update(vars(bound(decorate=compiled)))
+globals().update(vars(bound(decorate=inline)))
 
 
 def __getattr__(name: str) -> Any:
