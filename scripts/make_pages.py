@@ -28,7 +28,7 @@ from urdfkin.kinematics.registry import table as equations
 from urdfkin.model.configuration import draw_base
 from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
@@ -175,7 +175,7 @@ def study() -> dict[str, str]:
 
 
 def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
-    lines = [line for study in studies.values() for line in plain(study)["lines"]]
+    lines = [line for study in studies.values() for line in as_json_data(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 Each line of the tables below compares the typical errors of both libraries:

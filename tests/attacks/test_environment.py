@@ -176,7 +176,7 @@ def test_an_unusual_file_name_raises_an_error_of_urdfkin(name: str) -> None:
 def test_a_pipe_without_a_writer_is_refused_and_reading_ends_at_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(files, "PATIENCE", 0.1)
+    monkeypatch.setattr(files, "PIPE_TIMEOUT", 0.1)
     os.mkfifo(tmp_path / "pipe.urdf")
     os.mkfifo(tmp_path / "pipe.toml")
     with pytest.raises(SourceError, match="a pipe without a writer"):

@@ -91,7 +91,7 @@ CASES = {
     "a deep robot, while another thread builds one": """
         from urdfkin.system import processes
         held(processes._stack_size_lock)
-        fork(lambda: processes.with_stack(2**24, lambda: None))
+        fork(lambda: processes.call_with_stack(2**24, lambda: None))
         """,
     "verified results, after the parent had some": """
         checked = urdfkin.load("ur5")

@@ -203,16 +203,16 @@ def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not
     poses = [{"base": np.eye(4).tolist()}] * 3
     answer = json.dumps({"joints": ["shoulder"], "poses": poses}).encode()
     monkeypatch.setattr(readers, "version", lambda _: "1.0")
-    monkeypatch.setattr(readers, "ask_python", lambda *_: (answer, 0))
+    monkeypatch.setattr(readers, "run_python", lambda *_: (answer, 0))
     (found,) = compare_readers(robot, ["newton"], samples=2)
     assert found.missing == ("upper", "hand")
 
 
 def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load(TEXTS["mimic"])
-    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
+    monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "its process ended with -11"
-    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "sleep 20"])
+    monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "sleep 20"])
     monkeypatch.setattr(readers, "_PATIENCE", 0.2)
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
 

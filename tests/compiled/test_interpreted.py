@@ -265,7 +265,7 @@ def test_after_many_single_calls_the_function_for_single_calls_is_used() -> None
     q, begin = robot.neutral(), time.perf_counter()
     fast: Any = robot._prepare("panda_hand", Reference.LOCAL_WORLD_ALIGNED)
     before = robot.jacobian(q, "panda_hand")
-    fast.wanted = False
+    fast.always_load = False
     while hasattr(fast._jacobian, "func") and time.perf_counter() < begin + 120.0:
         assert (robot.jacobian(q, "panda_hand") == before).all()
     assert not hasattr(fast._jacobian, "func")

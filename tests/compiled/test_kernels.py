@@ -46,7 +46,7 @@ def test_streaming_stores_give_the_same_bits_at_any_address(
     v, a = np.random.default_rng(7).standard_normal((2, n, panda.nv))
     frames = ["panda_hand", "panda_link3"]
     jacobians, accelerations = panda.jacobian(q, frames), panda.acceleration(q, v, a, frames)
-    monkeypatch.setattr(evaluate, "_STREAMED", 0)
+    monkeypatch.setattr(evaluate, "_MIN_BUFFERED_BYTES", 0)
     for threads in (1, 2):
         with _between(jacobians, offset) as out:
             panda.jacobian(q, frames, out=out, threads=threads)

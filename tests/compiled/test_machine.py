@@ -21,7 +21,7 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 
 _TRIED = """
 import numba.np.linalg, numpy as np, urdfkin
@@ -36,7 +36,7 @@ print("scipy.linalg" in sys.modules)
 def test_scipy_is_imported_only_for_compiled_code_that_calls_blas() -> None:
     # Compiling imports more modules, so the list is stored here.
     urdfkin.load("one_link", verify=False).prepare("tip").placement(np.zeros(1))
-    done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)
+    done = subprocess.run(python_command(_TRIED), check=True, capture_output=True, text=True)
     assert done.stdout == "False\nTrue\n"
 
 

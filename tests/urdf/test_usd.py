@@ -839,7 +839,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
         return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0
 
-    monkeypatch.setattr(usd_check, "ask_python", ask)
+    monkeypatch.setattr(usd_check, "run_python", ask)
     return loaded(path)
 
 

@@ -43,7 +43,7 @@ from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import length
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
+from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_names, as_str, safe_repr
 from urdfkin.kinematics.inputs import rotation_defect, scalars
 from urdfkin.kinematics.rotation import polar_factor, rotation_of
 from urdfkin.model.configuration import checked
@@ -51,7 +51,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.robot.trajectory import read_arrays, read_columns
-from urdfkin.system.files import MOST_DATA, read_text
+from urdfkin.system.files import MAX_DATA_BYTES, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
@@ -433,7 +433,7 @@ def _add_identifiable(
 def _parse_noise(noise: tuple[float, float]) -> Noise:
     if not isinstance(noise, tuple | list) or len(noise) != 2:
         raise InputError("`noise` must be two numbers, in metres and radians", found=safe_repr(noise))
-    metres, radians = (real_number(one, "noise") for one in noise)
+    metres, radians = (as_finite_float(one, "noise") for one in noise)
     if min(metres, radians) <= 0.0:
         raise InputError(
             "`noise` must be positive",
@@ -581,7 +581,7 @@ def _table(
     units: Mapping[str, str],
     rest: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    text, where = read_text(path, MOST_DATA, pipes=True), str(path)
+    text, where = read_text(path, MAX_DATA_BYTES, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX if "T00" in names else _POSITION

@@ -37,7 +37,7 @@ from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import draw
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home
+from urdfkin.system.files import expand_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
@@ -134,7 +134,7 @@ def _write_tables(request: DHRequest) -> Answer:
 def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
-        table = read_table_or_screws(at_home(request.unchanged))
+        table = read_table_or_screws(expand_home(request.unchanged))
         # If the file contains screws, `Robot.dh` derives a table at the end of this function.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
@@ -186,7 +186,7 @@ def _write_tree(request: DHRequest) -> Answer:
     elif format_ == "csv":
         text = as_csv(parameters)
     else:
-        text = tree_document(parameters, request.units).written(format_)
+        text = tree_document(parameters, request.units).render(format_)
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
     check_line = str(check or check_of_path(None)[0])
     if format_ in _PRINTED:
@@ -228,7 +228,7 @@ def _compare(request: DHRequest, name: str) -> Answer:
         document = comparison_document(found, request.units)
         hints = ["", f"hint: {mistake}"] if mistake else []
         parts = [*notes, Strong(document.title), *document.parts, *hints]
-        text = TextDocument("", parts).written(request.format_)
+        text = TextDocument("", parts).render(request.format_)
     return _answer(request, text, 0 if found.passes else 1)
 
 

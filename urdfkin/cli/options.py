@@ -19,9 +19,9 @@ import click
 from urdfkin.cli.completion import complete_frame, complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
-from urdfkin.errors.numbers import parse_float, parse_int, remedy
+from urdfkin.errors.numbers import number_remedy, parse_float, parse_int
 from urdfkin.model.reference import Reference
-from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
+from urdfkin.system.files import MAX_DATA_BYTES, read_standard_input, read_text, shorten_path
 from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class WholeNumber(click.IntRange):
 class FiniteNumber(click.types.FloatParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_float(value) is None:
-            hint = remedy(value)
+            hint = number_remedy(value)
             self.fail(f"{value!r} is not a finite number{f': {hint}' if hint else ''}.", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -71,7 +71,7 @@ def format_from_suffix(
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
-                where=shortened(output),
+                where=shorten_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
         return format_ if chosen else without_suffix
@@ -496,7 +496,7 @@ def read_batch(
 
     from urdfkin.robot.trajectory import read_columns, width_of
 
-    text = _read_stdin() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
+    text = _read_stdin() if str(path) == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
@@ -512,7 +512,7 @@ def read_batch(
 
 def _read_stdin() -> str:
     try:
-        return read_standard_input(MOST_DATA).decode("utf-8-sig")
+        return read_standard_input(MAX_DATA_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"text that is not UTF-8 ({error})") from None
 

@@ -42,7 +42,7 @@ from urdfkin.cli.options import (
     with_base,
 )
 from urdfkin.cli.output import TEXTS, Answer, check_line, exit_code, report_compilation, writes_answer
-from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
+from urdfkin.errors.display import NOISE_FRACTION, Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
@@ -276,7 +276,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
-    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
+    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE_FRACTION * np.abs(value).max(initial=0.0)
     pairs = zip(*np.nonzero(seen), strict=True)
     rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in pairs]
     return Table(("column", "changed by", *quantity.labels), rows, left=2, names=(0, 1))
@@ -291,10 +291,10 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
     heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
 
     def table(k: int) -> Iterator[Table]:
-        noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
+        noise = NOISE_FRACTION * float(abs(found.terms[k]).max(initial=0.0))
         rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
         # With four digits, a row fits on a terminal.
-        cells = [(*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
+        cells = [(*names, *(format_number(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
         yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
@@ -526,7 +526,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
-    from urdfkin.system.documents import plain
+    from urdfkin.system.documents import as_json_data
 
     x = _read_options()
     with report_compilation():
@@ -549,10 +549,10 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     def data() -> dict[str, Any]:
         return _head(x, "q", quantity="singular values", frame=x.frame, rows=rows) | {
-            "singular_values": plain(found.values._asdict()),
-            "condition": plain(found.condition._asdict()),
-            "manipulability": plain(found.manipulability._asdict()),
-            "manipulability_gradient": plain(gradient),
+            "singular_values": as_json_data(found.values._asdict()),
+            "condition": as_json_data(found.condition._asdict()),
+            "manipulability": as_json_data(found.manipulability._asdict()),
+            "manipulability_gradient": as_json_data(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
                 if one

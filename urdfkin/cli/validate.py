@@ -27,7 +27,7 @@ from urdfkin.cli.output import check_writable, console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.quantities import compared, not_compared
 
@@ -272,7 +272,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
     try:
         from urdfkin.validation.cluster import connected
     except ImportError:
-        raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
+        raise InputError("--scheduler needs dask.distributed", remedy=install_command("cluster")) from None
     with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 

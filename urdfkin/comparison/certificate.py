@@ -27,7 +27,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
-from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, as_json_data, doc, of_length
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
@@ -44,16 +44,16 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 class CertifiedModel(TypedDict):
     """Name and source of one of the two compared models."""
 
-    name: Annotated[str, says("Name of the robot.")]
-    source: Annotated[str, says("Path, catalogue name, - for standard input, or <text>.")]
+    name: Annotated[str, doc("Name of the robot.")]
+    source: Annotated[str, doc("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
-    leader: Annotated[str, says("Name of the mimicked joint.")]
-    multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
+    leader: Annotated[str, doc("Name of the mimicked joint.")]
+    multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
+    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
 
 
 Value = str | float | list[str | float | None] | CertifiedRule | None
@@ -62,50 +62,50 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 class DifferenceEntry(TypedDict):
     """A difference between the two models at one joint or link."""
 
-    place: Annotated[str, says("Name of the joint or link of A that differs.")]
+    place: Annotated[str, doc("Name of the joint or link of A that differs.")]
     what: Annotated[
-        str, says("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
+        str, doc("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
     ]
-    a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
-    b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
-    radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
-    metres: Annotated[Size, says("Linear part of the difference, metres; 0 if there is none.")]
+    a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
+    b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
+    radians: Annotated[Size, doc("Angular part of the difference, radians; 0 if there is none.")]
+    metres: Annotated[Size, doc("Linear part of the difference, metres; 0 if there is none.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        says("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
+        doc("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
     ]
 
 
 class CertifiedConversion(TypedDict):
     """The pose of a planar or floating joint in B is before * (pose in A) * behind."""
 
-    before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
-    behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
+    before: Annotated[Matrix, doc("Matrix M (4, 4), multiplied from the left.")]
+    behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
-        says("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
+        doc("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
     ]
 
 
 class CertifiedJoint(TypedDict):
     """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
 
-    a: Annotated[str, says("Name of the joint in A.")]
-    b: Annotated[str, says("Name of the joint in B.")]
-    sense: Annotated[Literal[1, -1], says("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
-    offset: Annotated[float, says("Constant `offset`, rad or m.")]
+    a: Annotated[str, doc("Name of the joint in A.")]
+    b: Annotated[str, doc("Name of the joint in B.")]
+    sense: Annotated[Literal[1, -1], doc("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
+    offset: Annotated[float, doc("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        says("Conversion of a planar or floating joint's pose; null if not needed."),
+        doc("Conversion of a planar or floating joint's pose; null if not needed."),
     ]
 
 
 class ToolEntry(TypedDict):
     """Two matched links with different poses on their rigid body; `same` reports them as different tools."""
 
-    a: Annotated[str, says("Link of A.")]
-    b: Annotated[str, says("Link of B.")]
-    pose: Annotated[Matrix, says("Pose of the link of B in the frame of the link of A.")]
+    a: Annotated[str, doc("Link of A.")]
+    b: Annotated[str, doc("Link of B.")]
+    pose: Annotated[Matrix, doc("Pose of the link of B in the frame of the link of A.")]
 
 
 class Rounding(TypedDict):
@@ -121,42 +121,42 @@ class Rounding(TypedDict):
 class FrameEntry(TypedDict):
     """An interval that contains the largest distance between a frame of A and the matching frame of B."""
 
-    frame: Annotated[str, says("Link of A.")]
-    frame_b: Annotated[str, says("Link of B.")]
+    frame: Annotated[str, doc("Link of A.")]
+    frame_b: Annotated[str, doc("Link of B.")]
     lower: Annotated[
         Size,
-        says(
+        doc(
             "Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding"
             " error."
         ),
     ]
     upper: Annotated[
         Size | None,
-        says(
+        doc(
             "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
             " proven."
         ),
     ]
     radians: Annotated[
         Size | None,
-        says(
+        doc(
             "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
             " proven."
         ),
     ]
-    radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
-    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
-    q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
+    radians_seen: Annotated[Size, doc("Angle between the orientations at `q_a` and `q_b`, radians.")]
+    q_a: Annotated[list[float], doc("Configuration of A; empty if the frame does not differ.")]
+    q_b: Annotated[list[float], doc("Configuration of B that corresponds to `q_a`.")]
 
 
 class Confirmed(TypedDict):
     """Pinocchio's confirmation of the bounds."""
 
-    state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
-    by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[Count, says("Number of configurations at which the oracle checked the bounds.")]
-    metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
-    reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
+    state: Annotated[ConfirmationState, doc("Whether the oracle confirmed the bounds.")]
+    by: Annotated[str, doc("Name and version of the oracle; empty without a confirmation.")]
+    configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
+    metres: Annotated[Size, doc("Largest distance that the oracle computed, metres.")]
+    reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
 class SameCertificate(Header):
@@ -166,34 +166,34 @@ class SameCertificate(Header):
     b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes that bring B closest to A."),
+        doc("Kinds of changes that bring B closest to A."),
     ]
-    differences: Annotated[list[DifferenceEntry], says("Differences, in order from the base to the tips.")]
+    differences: Annotated[list[DifferenceEntry], doc("Differences, in order from the base to the tips.")]
     remarks: Annotated[
         list[DifferenceEntry],
-        says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
+        doc("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
-    joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
+    joints: Annotated[list[CertifiedJoint], doc("Matched pairs of a joint of A and a joint of B.")]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
     tools: Annotated[
         list[ToolEntry],
-        says("Matched links whose poses differ; each counts as a different tool."),
+        doc("Matched links whose poses differ; each counts as a different tool."),
     ]
     orders: Annotated[
-        list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")
+        list[list[str]], doc("Consecutive joints of B whose order was changed, in the new order.")
     ]
-    base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
+    base: Annotated[Matrix, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), says("Poses are compared relative to these links of A and B.")
+        list[str], of_length(2), doc("Poses are compared relative to these links of A and B.")
     ]
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        says("Interval of the largest distance for each pair of matched links, after B is changed."),
+        doc("Interval of the largest distance for each pair of matched links, after B is changed."),
     ]
     as_written: Annotated[
         FrameEntry | None,
-        says("Interval for the frame with the largest distance before B is changed; null without changes."),
+        doc("Interval for the frame with the largest distance before B is changed; null without changes."),
     ]
     checked: Confirmed
 
@@ -219,7 +219,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
         **{name: getattr(result, name) for name in _COPIED},
         "rounding": dict(zip(("metres", "radians"), result.rounding, strict=True)),
     }
-    return cast("SameCertificate", plain(document))
+    return cast("SameCertificate", as_json_data(document))
 
 
 #: Attributes of `Sameness` that the certificate contains under the same names.
@@ -341,7 +341,7 @@ def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, alignment: Alignment, variables: Variables
 ) -> Iterator[str]:
     state, reason = claimed["state"], claimed["reason"]
-    if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
+    if state != "confirmed" and reason and claimed == as_json_data(Confirmation(state, reason=reason)):
         return
     known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
     if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:

@@ -31,7 +31,7 @@ from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load, robot_of
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
@@ -265,7 +265,7 @@ def _renamed(result: Sameness) -> KinematicTree:
 
 
 def _changes(old: str, new: str) -> Iterator[ModelChange]:
-    roots = plain_xml(old), plain_xml(new)
+    roots = parse_xml(old), parse_xml(new)
     names = roots[0].get("name"), roots[1].get("name")
     if names[0] != names[1]:
         yield ModelChange("robot", "name", *names)

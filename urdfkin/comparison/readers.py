@@ -16,10 +16,10 @@ from xml.parsers.expat import ExpatError
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.model.tree import FloatArray, Joint, JointKind
-from urdfkin.system.plain_xml import plain_xml
-from urdfkin.system.processes import ask_python, own_python
+from urdfkin.system.plain_xml import parse_xml
+from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.mjcf import is_mjcf, is_text
 from urdfkin.urdf.sources import is_usd
 from urdfkin.verify.adapters import LIBRARIES, version
@@ -138,15 +138,15 @@ def _reading(
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
     values = [values_of(robot, one) for one in q]
-    command = own_python("from urdfkin.verify.adapters import main; main()")
+    command = python_command("from urdfkin.verify.adapters import main; main()")
     case = {"name": robot.name, "text": source, "configurations": values}
-    output, status = ask_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST_BYTES)
+    output, status = run_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST_BYTES)
     if status != 0 or not output:
         how = f"no answer in {_PATIENCE:g} s" if status is None else f"its process ended with {status}"
         return LibraryReading(title, number, how)
     answer = json.loads(output)
     if "error" in answer:
-        return LibraryReading(title, number, printable(answer["error"])[:_MOST_CHARACTERS])
+        return LibraryReading(title, number, escape_unprintable(answer["error"])[:_MOST_CHARACTERS])
     links = robot.link_names
     tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].single else _TOLERANCE
     tolerance *= max(1.0, float(np.abs(ours).max()))
@@ -201,7 +201,7 @@ def _without_shapes(text: str) -> str:
     """Return a URDF without shapes; some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
-    robot = plain_xml(text)
+    robot = parse_xml(text)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
             link.remove(shape)
@@ -210,7 +210,7 @@ def _without_shapes(text: str) -> str:
 
 def _elements(text: str) -> dict[str, Any]:
     try:
-        return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
+        return {joint.get("name", ""): joint for joint in parse_xml(text).iterfind("joint")}
     except ExpatError:
         return {}
 

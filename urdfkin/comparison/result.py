@@ -32,7 +32,7 @@ from urdfkin.model.mechanisms.mechanism import (
     tolerance_of,
 )
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
@@ -377,8 +377,8 @@ class Sameness(Displayable):
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
-    def _sheet(self) -> TextDocument:
-        document: TextDocument = hook("a comparison as a document")(self)
+    def _text_document(self) -> TextDocument:
+        document: TextDocument = get_hook("a comparison as a document")(self)
         return document
 
     @property

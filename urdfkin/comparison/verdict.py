@@ -31,7 +31,7 @@ from urdfkin.comparison.result import (
 )
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import real_number, whole_number
+from urdfkin.errors.validators import as_finite_float, as_int
 from urdfkin.kinematics.roundings import EPS, SINGLE
 from urdfkin.model.configuration import WIDEST, narrowed_ranges
 from urdfkin.model.conventions.convention import spellings
@@ -117,9 +117,9 @@ def same(
     """
     robots = tuple(source if isinstance(source, Robot) else load(source) for source in (a, b))
     joint_map = _parse_map(map)
-    whole_number(boxes, "boxes", 0)
+    as_int(boxes, "boxes", 0)
     if within is not None:
-        within = real_number(within, "within")
+        within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         demand_joint_names(robot.tree, list(names), which)
     # The comparison stores compiled trees in the robots that it uses.

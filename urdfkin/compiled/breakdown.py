@@ -73,7 +73,7 @@ class AccelerationBreakdown(Displayable):
                 if self.terms[(*sample, j, k)].any():
                     yield joint, kind, self.terms[(*sample, j, k)]
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
         batch = self.base.shape[:-1]
         parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]

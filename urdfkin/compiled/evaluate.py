@@ -33,7 +33,7 @@ from urdfkin.compiled.plan import (
 )
 from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.errors.validators import whole_number
+from urdfkin.errors.validators import as_int
 from urdfkin.model.base_motion import STILL_STATE, against_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -185,7 +185,7 @@ def _compute_interpreted(
     if preload.get_kernel(name) is not None:
         return None
     if threads is not None:
-        whole_number(threads, "threads", 1)
+        as_int(threads, "threads", 1)
     recursion, least, invalid = getattr(recursions, name), math.inf, 0
     flat = out.reshape(len(out), math.prod(out.shape[1:]))
     for i, row in enumerate(flat):
@@ -310,7 +310,7 @@ def compute_in_blocks(
     if an input is nan, infinite or too large, else 0.
     """
     n = len(out)
-    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
+    threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     if n == 0:
         return 0
     if (threads := min(threads, n // LANES)) > 1:
@@ -329,7 +329,7 @@ def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | No
 
     If n is 0, `compute` is called once, with an empty slice.
     """
-    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
+    threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     parts = [slice(i, min(i + ROWS_PER_PART, n)) for i in range(0, max(n, 1), ROWS_PER_PART)]
     count = min(threads, len(parts), _processors())
     parts_by_thread = [parts[k::count] for k in range(count)]

@@ -160,12 +160,12 @@ def _compile_in_background(name: str, module: str) -> bool:
 def _start_compiler(names: Sequence[str], module: str = KERNELS_MODULE) -> subprocess.Popen[bytes]:
     import subprocess
 
-    from urdfkin.system.processes import own_python
+    from urdfkin.system.processes import python_command
 
     load = f"preload._load_group({tuple(names)!r}, {module!r})"
     code = f"{_EXIT_WITH_PARENT} from urdfkin.compiled import preload; {load}"
     return subprocess.Popen(
-        own_python(code),
+        python_command(code),
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -39,7 +39,7 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.cache import make_cache_folder, read_cached_file, write_cached_file
-from urdfkin.system.locks import import_lock, lock_over_forks
+from urdfkin.system.locks import import_lock, make_fork_safe_lock
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
@@ -170,7 +170,7 @@ _N, _OUT, _STAGE, *_INPUTS = map(
 )
 _Arguments = ctypes.c_int64 * len(KernelArgs)
 _DOUBLE = np.dtype(np.float64)
-_compiling = lock_over_forks()
+_compiling = make_fork_safe_lock()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:

@@ -14,7 +14,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import counted
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 
 #: Residuals below this fraction of the noise are only rounding errors.
 _ROUNDING = 0.5
@@ -145,4 +145,4 @@ def as_data(found: Calibration) -> dict[str, Any]:
         "placements": {name: T for name, T in names if T is not None},
         "origins": found.origins,
     }
-    return cast("dict[str, Any]", plain(data))
+    return cast("dict[str, Any]", as_json_data(data))

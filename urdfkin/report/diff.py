@@ -12,7 +12,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, table_lines
 from urdfkin.report.words import counted
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 
 HEADS = ("element", "what", "old", "new", "alone")
 
@@ -115,4 +115,4 @@ def as_data(found: Changes) -> dict[str, Any]:
         "total": far(found.total),
         "rounding": found.rounding and dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
-    return cast("dict[str, Any]", plain(data))
+    return cast("dict[str, Any]", as_json_data(data))

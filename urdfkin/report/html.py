@@ -38,7 +38,7 @@ from urdfkin.report.words import (
     worst,
     worst_cell,
 )
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement
 from urdfkin.verify.quantities import compared, not_compared
@@ -73,7 +73,7 @@ def environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["counted"] = counted
-    environment.globals["install_remedy"] = install_remedy
+    environment.globals["install_command"] = install_command
     return environment
 
 

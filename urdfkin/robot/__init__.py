@@ -27,11 +27,11 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import (
     as_bool,
     as_choice,
+    as_finite_float,
+    as_int,
     as_names,
     as_str,
-    real_number,
     safe_repr,
-    whole_number,
 )
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import scalars, vectors
@@ -45,7 +45,7 @@ from urdfkin.model.configuration_like import Given, listed
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import Joints, described
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 from urdfkin.system.locks import import_lock
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, entry_of
@@ -190,11 +190,11 @@ class Robot(Displayable):
     def __dir__(self) -> list[str]:
         return [name for name in super().__dir__() if name not in _INTERNAL]
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         with import_lock:
-            from urdfkin.system.plain_xml import order_words
+            from urdfkin.system.plain_xml import joint_order_sentence
 
-        order = order_words(self.urdf, self.joint_names)
+        order = joint_order_sentence(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: Given = "ready", *, height: int = 480) -> Any:
@@ -217,7 +217,7 @@ class Robot(Displayable):
         q_0 = configuration.checked(self.tree, q, "q")
         if q_0.ndim != 1:
             raise InputError("q of a view must be one configuration", found=f"shape {q_0.shape}")
-        return hook("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
+        return get_hook("a robot in a cell")(self, q_0, as_int(height, "height", 1, 10_000))
 
     # -- description ---------------------------------------------------------------------------------
 
@@ -506,8 +506,8 @@ class Robot(Displayable):
         >>> q.shape, arm.limit_violations(q)
         ((5, 2), [])
         """
-        n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
-        seed = whole_number(seed, "seed", 0)
+        n = as_int(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
+        seed = as_int(seed, "seed", 0)
         try:
             return sample(self.tree, n, np.random.default_rng(seed))
         except MemoryError:
@@ -1119,7 +1119,10 @@ class Robot(Displayable):
         >>> J.shape, J[5].tolist()  # yaw = q1 + q2
         ((6, 2), [1.0, 1.0])
         """
-        representation, nearest = as_str(representation, "representation"), real_number(nearest, "nearest")
+        representation, nearest = (
+            as_str(representation, "representation"),
+            as_finite_float(nearest, "nearest"),
+        )
         representation = "xyz" if representation == "rpy" else representation
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
@@ -1361,8 +1364,8 @@ class Robot(Displayable):
         """
         frame, form = as_choice(frame, self.tip_frame, "frame"), as_str(form, "form")
         name = None if name is None else as_str(name, "name")
-        code = hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
-        return str(hook("code in a language")(code, as_str(to, "to")))
+        code = get_hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
+        return str(get_hook("code in a language")(code, as_str(to, "to")))
 
     def torch(
         self,

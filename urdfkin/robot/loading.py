@@ -16,7 +16,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home, read_bytes
+from urdfkin.system.files import expand_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, tilts
 from urdfkin.urdf.lint.rules.left_out import of_mjcf
@@ -178,7 +178,7 @@ def _load_table(
     if isinstance(source, DHTable | ProductOfExponentials):
         table, name = source, "<table>"
     else:
-        path = at_home(source)
+        path = expand_home(source)
         table, name = read_table_or_screws(path), as_word(path)
     if isinstance(table, ProductOfExponentials):
         urdf = write_urdf(table.to_tree())
@@ -277,7 +277,7 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
         return source
     if is_text(source):
         return str(source).encode("utf-8", "surrogatepass")
-    return read_bytes(at_home(source))
+    return read_bytes(expand_home(source))
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:

@@ -33,8 +33,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
-from urdfkin.errors.validators import real_number, whole_number
+from urdfkin.errors.numbers import UNITS, number_remedy, parse_float, parse_quantity, radians_from_degrees
+from urdfkin.errors.validators import as_finite_float, as_int
 from urdfkin.kinematics.inputs import FloatArray, scalars
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
@@ -42,7 +42,7 @@ from urdfkin.model.configuration import checked, coordinate_layout
 from urdfkin.model.configuration_like import Given, listed, wrong_count
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
-from urdfkin.system.files import MOST_DATA, read_bytes, read_text
+from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_text
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
@@ -63,14 +63,14 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
         InputError: an array is unknown, missing, of a wrong shape or not finite.
     """
     try:
-        with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("a single array")
             _check_names(path, archive.files, shapes, required)
             entries = archive.zip.infolist() if archive.zip else []
             size = sum(entry.file_size for entry in entries)
-            if size > MOST_DATA:
-                raise ValueError(f"arrays of {size} bytes, more than {MOST_DATA}")
+            if size > MAX_DATA_BYTES:
+                raise ValueError(f"arrays of {size} bytes, more than {MAX_DATA_BYTES}")
             given = {name: archive[name] for name in archive.files}
     except (
         ValueError,
@@ -191,8 +191,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     continuous joint moves by `end - start`, even by more than one turn. `duration` is in seconds, and
     `samples` counts both ends.
     """
-    duration = real_number(duration, "the duration")
-    samples = whole_number(samples, "samples", 0)
+    duration = as_finite_float(duration, "the duration")
+    samples = as_int(samples, "samples", 0)
     if duration <= 0.0 or samples < _FEWEST:
         raise InputError(
             f"a line needs a duration above 0 and at least {_FEWEST} samples",
@@ -351,7 +351,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
         if conversion is None
         else f"a trajectory in the convention {conversion.convention.name}"
     )
-    text = read_text(path, MOST_DATA, pipes=True)
+    text = read_text(path, MAX_DATA_BYTES, pipes=True)
     data = read_columns(text, str(path), what, names["q"], optional, named=True, units=units)
     found = {x: _columns(path, data, names[x]) for x in "qva" if x == "q" or any(n in data for n in names[x])}
     return found | ({"t": data["t"]} if "t" in data else {})
@@ -521,8 +521,8 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # For k * 15 degrees, `in_radians` returns exactly k * pi / 12.
-        return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
+        # For k * 15 degrees, `radians_from_degrees` returns exactly k * pi / 12.
+        return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
@@ -539,7 +539,10 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
     for name, cell in zip(names, cells, strict=True):
         if (value := parse_float(cell)) is None:
             raise InputError(
-                "not a finite number", where=f"{where}, {name}", found=repr(cell.strip()), remedy=remedy(cell)
+                "not a finite number",
+                where=f"{where}, {name}",
+                found=repr(cell.strip()),
+                remedy=number_remedy(cell),
             )
         values.append(value)
     return values

@@ -27,7 +27,7 @@ from pathlib import Path
 import platformdirs
 
 from urdfkin.errors import SourceError
-from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
+from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_if_exists
 
 #: Version of the checksum; the digest in a folder's name depends on this version.
 _CHECKSUM_VERSION = "sealed with its name"
@@ -140,7 +140,7 @@ def write_cached_file(path: Path, data: bytes) -> None:
 def read_cached_file(path: Path) -> bytes | None:
     """Return the content of a file that `write_cached_file` wrote, or None for a missing or damaged file."""
     try:
-        content = read_if_there(path, MOST_DATA)
+        content = read_if_exists(path, MAX_DATA_BYTES)
     except SourceError as error:
         report_damaged(path, error.found or error.what)
         return None

@@ -25,10 +25,10 @@ from enum import Enum
 from itertools import islice
 from typing import Any
 
-from urdfkin.errors import UrdfkinError, nearest
+from urdfkin.errors import UrdfkinError, find_similar_names
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.errors.escape import log_line, printable
-from urdfkin.system.files import Edit, edited
+from urdfkin.errors.escape import escape_unprintable, log_line
+from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
 
 #: Maximum number of characters of a file that a message quotes.
@@ -36,7 +36,7 @@ QUOTED = 60
 
 
 def shortened(text: str, limit: int = QUOTED) -> str:
-    return printable(text if len(text) <= limit else text[: limit - 3] + "...")
+    return escape_unprintable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
 def quoted(text: str, limit: int = QUOTED) -> str:
@@ -75,7 +75,7 @@ class Excerpts:
         last = first + SHOWN
         end = min(start + finding.width, last)
         pieces = self.text[first:start], self.text[start:end], self.text[end:last]
-        before, marked, behind = (printable(piece.replace("\t", _TAB)) for piece in pieces)
+        before, marked, behind = (escape_unprintable(piece.replace("\t", _TAB)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
@@ -118,7 +118,7 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
         if fix.edits[0].start >= end:
             taken.append(fix)
             end = fix.edits[-1].end
-    return mark + edited(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
+    return mark + apply_edits(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
 
 
 class Severity(Enum):
@@ -200,7 +200,7 @@ class Finding:
             return ""
         tag = shortened(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"
+            return f"{tag} '...{escape_unprintable(self.name[3 - QUOTED :])}'"
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -240,7 +240,7 @@ class Finding:
         return f"{subject}{self.message}{found}{also}{remedy}"
 
     def __str__(self) -> str:
-        place = f"{printable(self.file)}:{self.line}:{self.column}"
+        place = f"{escape_unprintable(self.file)}:{self.line}:{self.column}"
         return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
@@ -260,7 +260,7 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
         return TextDocument(totals(self), table)
@@ -508,7 +508,7 @@ class Reporter:
         self._searches += 1
         if self._searches > SEARCHES:
             return []
-        return nearest(word, islice(known, CANDIDATES), work=WORK)
+        return find_similar_names(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
         kind = self._kinds.get((rule.id, rule.severity))

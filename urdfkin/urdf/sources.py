@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeGuard
 
-from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, nearest
+from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
-from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
+from urdfkin.system.files import MAX_BYTES, exists, expand_home, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
 
 USD = (".usd", ".usda", ".usdc", ".usdz")
@@ -141,7 +141,9 @@ class Text:
     articulation: str | None = None
 
 
-def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
+def read_source(
+    source: Source, most: int = MAX_BYTES, xacro_args: Mapping[str, object] | None = None
+) -> Text:
     """Read a URDF from any source.
 
     Read at most `most` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
@@ -156,7 +158,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
         source = _in_package(*address)
     if is_xacro(source):
-        return _expand_xacro(at_home(source), xacro_args or {})
+        return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
         names = ", ".join(map(str, xacro_args))
         raise InputError("`xacro_args` needs the path of a .xacro file", found=names)
@@ -217,7 +219,7 @@ def _read_string(word: str, most: int) -> Text:
     if (entry := entry_of(word)) is not None:
         read = _read_file(entry.path, most)
         return Text(read.data, read.label, word, entry)
-    path = at_home(word)
+    path = expand_home(word)
     if os.sep in word or path.suffix or exists(path):
         return _read_file(path, most)
     raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
@@ -274,5 +276,5 @@ def _nearest_file(path: Path) -> str:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
         return f"the folder {path.parent} does not exist"
-    close = nearest(path.name, names)
+    close = find_similar_names(path.name, names)
     return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

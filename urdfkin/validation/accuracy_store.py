@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 from urdfkin.errors import InputError
-from urdfkin.system.documents import typed
-from urdfkin.system.files import read_if_there
+from urdfkin.system.documents import from_data
+from urdfkin.system.files import read_if_exists
 from urdfkin.validation.accuracy import AccuracyStudy
 from urdfkin.validation.answer import DamagedError, pack, unpack
 from urdfkin.validation.manifest import LAYOUT
@@ -63,9 +63,9 @@ class AccuracyResult:
     def of(cls, store: Store) -> AccuracyResult | None:
         """Return the results in a store; None if there are none, or the settings are unreadable."""
         try:
-            if (content := read_if_there(store.folder / STUDY_FILE)) is None:
+            if (content := read_if_exists(store.folder / STUDY_FILE)) is None:
                 return None
-            settings = typed(json.loads(content), StudySettings)
+            settings = from_data(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.tell(
                 f"{store.folder / STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
@@ -112,7 +112,7 @@ def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
     data = unpack(key, content).get("accuracy")
     try:
         if isinstance(data, dict) and "reason" in data:
-            return typed(data, FailedStudy)
-        return typed(data, AccuracyStudy)
+            return from_data(data, FailedStudy)
+        return from_data(data, AccuracyStudy)
     except ValueError as error:
         raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

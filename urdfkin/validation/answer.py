@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from urdfkin.errors import OracleError, UrdfkinError
-from urdfkin.system.documents import as_data, typed
+from urdfkin.system.documents import as_data, from_data
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.error_stats import Key, Tally
@@ -118,9 +118,9 @@ def decode_answer(key: str, content: bytes) -> Answer:
     body = unpack(key, content)
     try:
         if "failure" in body:
-            return typed(body["failure"], Failure)
-        tallies = dict(typed(body["tallies"], list[tuple[Key, Tally]]))
-        return replace(typed(body["result"], ChunkResult), tallies=tallies)
+            return from_data(body["failure"], Failure)
+        tallies = dict(from_data(body["tallies"], list[tuple[Key, Tally]]))
+        return replace(from_data(body["result"], ChunkResult), tallies=tallies)
     except (ValueError, KeyError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 

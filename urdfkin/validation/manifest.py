@@ -70,7 +70,7 @@ class Manifest:
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
         layout = DocumentKind(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
-        return layout.checked(parse_json(content, where), where)
+        return layout.validate(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
         own, theirs = (

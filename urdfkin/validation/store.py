@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import IO, TypeVar
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.system.files import read_bytes, read_if_there
+from urdfkin.system.files import read_bytes, read_if_exists
 from urdfkin.validation.answer import Answer, DamagedError, Failure, decode_answer, encode_answer
 from urdfkin.validation.manifest import Manifest
 
@@ -72,7 +72,7 @@ class Store:
         """Return the decoded content of a file; None if the file is missing or damaged."""
         place = self._place(key, kind)
         try:
-            content = read_if_there(place)
+            content = read_if_exists(place)
             return None if content is None else decode(key, content)
         except (DamagedError, OSError) as error:
             why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)

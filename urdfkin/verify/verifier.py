@@ -22,7 +22,7 @@ from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.system.lazy_import import own_version
+from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.urdf.sources import Origin
 from urdfkin.verify.bounds import KERNELS, Bound, magnitudes
 from urdfkin.verify.call import Call, Part
@@ -172,7 +172,7 @@ class Verifier:
             reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
             source=self.origin.source,
             sha256=self.sha256,
-            urdfkin=own_version(),
+            urdfkin=urdfkin_version(),
         )
 
     @property

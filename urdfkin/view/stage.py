@@ -17,7 +17,7 @@ import numpy as np
 
 from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.dh.table import DHConvention, DHTable
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
@@ -245,7 +245,7 @@ class Stage:
         return [
             self._scene.add_label(
                 f"/robot/{i}/{kind}",
-                printable(word),
+                escape_unprintable(word),
                 font_screen_scale=0.7,
                 anchor="bottom-left",
                 visible=False,

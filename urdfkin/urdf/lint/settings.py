@@ -29,7 +29,7 @@ from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.system.files import exists, is_folder, read_text
-from urdfkin.system.git import Version
+from urdfkin.system.git import CommitFiles
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.lint.pages import find_rules
@@ -254,7 +254,7 @@ class Choice:
         return replace(self, baseline=copies[0]).of(text, copies[1])
 
 
-def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
+def known_before(text: Text, version: CommitFiles, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
     An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
@@ -267,11 +267,11 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
         # every finding is new.
-        return Baseline(Counter()) if version.changed(_PARTS) else None
-    same = version.holds(text.data)
-    old = text.data if same else version.read(path)
+        return Baseline(Counter()) if version.has_changes(_PARTS) else None
+    same = version.contains(text.data)
+    old = text.data if same else version.read_file(path)
     found = () if old is None else look(replace(text, data=old)).findings
-    if any(os.fsencode(name) in text.data for name in version.gone):
+    if any(os.fsencode(name) in text.data for name in version.missing_names):
         found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
     elif same:
         return None
