@@ -57,7 +57,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/fast.md": (
         "Fast evaluation",
         "Evaluators of one frame for a control loop, and kinematics as source code.",
-        "prepare urdfkin.compiled.prepared.PreparedFrame compiled "
+        "prepare urdfkin.compiled.prepared.PreparedFrame compile "
         "urdfkin.export.compiled_frame.CompiledFrame export torch",
     ),
     "api/tables.md": (

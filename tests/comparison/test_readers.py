@@ -77,7 +77,7 @@ def test_an_added_root_joint_is_no_difference_and_a_locked_joint_is_an_error() -
     assert found.agrees, found
     assert (found.same_order, found.missing) == (True, ())
     with pytest.raises(urdfkin.InputError, match="cannot lock joints"):
-        compare_readers(urdfkin.load(TEXTS["two revolute"]).locked({"j1": 0.1}), ["yourdfpy"])
+        compare_readers(urdfkin.load(TEXTS["two revolute"]).with_locked_joints({"j1": 0.1}), ["yourdfpy"])
 
 
 def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path) -> None:

@@ -159,7 +159,7 @@ NOT_PLAIN: dict[str, Callable[[tuple[int, ...]], Any]] = {
 def test_an_out_that_is_no_plain_array_is_refused_and_not_changed(kind: str) -> None:
     robot = load("ur5", verify=False)
     q, one, table = robot.sample(1, 1)[0], NOT_PLAIN[kind]((6, 6)), NOT_PLAIN[kind]((4, 4))
-    prepared, compiled = robot.prepare("tool0"), robot.compiled("tool0")
+    prepared, compiled = robot.prepare("tool0"), robot.compile("tool0")
     calls = [
         lambda: robot.jacobian(q, "tool0", out=one),
         lambda: robot.jacobian(q, "tool0", out=one, threads=1),

@@ -131,7 +131,7 @@ def test_a_new_quantity_is_checked_along_a_trajectory() -> None:
     q = robot.sample(3)
     x = frame_motion(robot, (q, q, q), "tool0")
     assert x.agrees
-    assert x.checks["angular velocity"].share.shape == (3,)
+    assert x.checks["angular velocity"].bound_ratio.shape == (3,)
 
 
 # -- the table -----------------------------------------------------------------------------------------

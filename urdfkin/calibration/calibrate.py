@@ -588,7 +588,7 @@ def _table(
     others = [name for name in coordinates if name not in needed]
     optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
     required = [*needed, *kind]
-    data = read_columns(text, where, "measured poses", required, optional, named=True, units=units)
+    data = read_columns(text, where, "measured poses", required, optional, requires_header=True, units=units)
     s = len(data[kind[0]])
     values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, rest, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))

@@ -326,7 +326,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 def warn_of_motion(motion: Trajectory) -> None:
     for note in motion.notes:
         say(f"warning: {note}", err=True)
-    if motion.rates != "as given":
+    if motion.rates_source != "as given":
         say(f"rates {motion.derivation()}", err=True)
 
 
@@ -494,10 +494,10 @@ def read_batch(
     """
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_columns, width_of
+    from urdfkin.robot.trajectory import count_cells, read_columns
 
     text = _read_stdin() if str(path) == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
-    width = width_of(text, str(path)) if len(layouts) > 1 else None
+    width = count_cells(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
     rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
@@ -574,13 +574,13 @@ def with_base(
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
     import numpy as np
 
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)
     cells = text.split(",")
     names = next((names for names in layouts if len(names) == len(cells)), layouts[0])
-    return np.array([numbers(cells, option, names)]), names
+    return np.array([parse_numbers(cells, option, names)]), names
 
 
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:

@@ -96,7 +96,7 @@ def _read_trajectory(
 ) -> Inputs:
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_samples, with_rates
+    from urdfkin.robot.trajectory import complete_rates, read_samples
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
@@ -106,9 +106,9 @@ def _read_trajectory(
     settings = locked_joints(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
-        motion = with_rates(robot.tree, x)
+        motion = complete_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
-        settings["derivatives"] = motion.rates
+        settings["derivatives"] = motion.rates_source
         warn_of_motion(motion)
     warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
@@ -485,10 +485,10 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     or by arrays in the .npz file. With --root-joint floating, the pose of the root link is part of --q. See
     `urdfkin explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     x = _read_options()
-    g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
+    g = parse_numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with report_compilation():
         return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
 

@@ -30,7 +30,7 @@ from urdfkin.kinematics.roundings import SINGLE
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load, robot_of
+from urdfkin.robot.loading import load, make_robot
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
@@ -337,4 +337,4 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 def _quiet_robot(tree: KinematicTree) -> Robot:
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
-    return robot_of(text, verify=False, made=True, quiet=True)
+    return make_robot(text, verify=False, is_generated=True, quiet=True)

@@ -191,11 +191,11 @@ class _ExportedRobot(Protocol):
     @property
     def compute(self) -> Callable[..., FloatArray]: ...
     @property
-    def compiled(self) -> Callable[..., CompiledFrame]: ...
+    def compile(self) -> Callable[..., CompiledFrame]: ...
 
 
 class CompiledFrame:
-    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compiled`.
+    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compile`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
@@ -209,7 +209,7 @@ class CompiledFrame:
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
-    >>> fast, q = robot.compiled("tool0"), robot.sample(1000)
+    >>> fast, q = robot.compile("tool0"), robot.sample(1000)
     >>> fast.jacobian(q).shape
     (1000, 6, 6)
     """
@@ -229,13 +229,13 @@ class CompiledFrame:
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
         # Memory addresses are not valid in another process, so unpickling creates a new object.
-        return self._robot.compiled, (self.frame, self.reference)
+        return self._robot.compile, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
         """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
@@ -249,7 +249,7 @@ class CompiledFrame:
         """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
@@ -261,7 +261,7 @@ class CompiledFrame:
         """Return the Jacobian (..., 6, nv): eq. 7.85.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian([0.0, 0.0])[1].tolist()
         [0.9, 0.4]
         """
@@ -275,7 +275,7 @@ class CompiledFrame:
         """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian_rate([0.0, 0.0], [1.0, 0.0])[0].tolist()
         [-0.9, -0.4]
         """
@@ -287,7 +287,7 @@ class CompiledFrame:
         """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.hessian([0.0, 0.0])[0].tolist()
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
@@ -307,7 +307,7 @@ class CompiledFrame:
         """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0])[0].item()
         -0.9
         """

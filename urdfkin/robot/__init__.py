@@ -85,9 +85,9 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 #: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
 #: Internal members that `dir(robot)` leaves out, so that name completion does not offer them.
-_INTERNAL = {"plan", "verifier"}
+_INTERNAL_NAMES = {"plan", "verifier"}
 #: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
-_MOST_NUMBERS = (2**63 - 1) // 8
+_MAX_NUMBERS = (2**63 - 1) // 8
 
 
 class Robot(Displayable):
@@ -188,7 +188,7 @@ class Robot(Displayable):
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
-        return [name for name in super().__dir__() if name not in _INTERNAL]
+        return [name for name in super().__dir__() if name not in _INTERNAL_NAMES]
 
     def _text_document(self) -> TextDocument:
         with import_lock:
@@ -506,7 +506,7 @@ class Robot(Displayable):
         >>> q.shape, arm.limit_violations(q)
         ((5, 2), [])
         """
-        n = as_int(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
+        n = as_int(n, "n", 0, _MAX_NUMBERS // max(1, self.nq))
         seed = as_int(seed, "seed", 0)
         try:
             return sample(self.tree, n, np.random.default_rng(seed))
@@ -691,7 +691,7 @@ class Robot(Displayable):
 
         return ConventionRobot(self, self.convention(name, joints))
 
-    def locked(
+    def with_locked_joints(
         self, lock: str | Mapping[str, ArrayLike] = MappingProxyType({}), joints: Sequence[str] | None = None
     ) -> Robot:
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
@@ -711,10 +711,10 @@ class Robot(Displayable):
                 (planar, floating, fixed).
 
         >>> import urdfkin
-        >>> panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04})
+        >>> panda = urdfkin.load("panda").with_locked_joints({"panda_finger_joint1": 0.04})
         >>> panda.nq, panda.jacobian("ready", "panda_hand_tcp").shape
         (7, (6, 7))
-        >>> elbow = urdfkin.load("planar_two_link").locked(joints=["joint_2"])
+        >>> elbow = urdfkin.load("planar_two_link").with_locked_joints(joints=["joint_2"])
         >>> elbow.rate_names, elbow.joints["joint_1"].lock.value
         (('joint_2',), 0.0)
         """
@@ -763,7 +763,7 @@ class Robot(Displayable):
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
             raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=safe_repr(inputs))
-        return self._computed(name, inputs, frame, reference, base, out, verify, threads)
+        return self._compute_array(name, inputs, frame, reference, base, out, verify, threads)
 
     def placement(
         self,
@@ -785,10 +785,10 @@ class Robot(Displayable):
         >>> arm.placement([[0.0, 0.0], [0.1, 0.2]], ["link_2", "tip"]).shape
         (2, 2, 4, 4)
         """
-        fast = self._fast(frame, _ALIGNED, base, verify, threads)
+        fast = self._find_evaluator(frame, _ALIGNED, base, verify, threads)
         if fast and (result := fast._placement(q, out)) is not None:
             return result
-        return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
+        return self._compute_array("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
     def relative_placement(
         self,
@@ -848,10 +848,10 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], {"joint_1": 1.0, "joint_2": 0.0}).round(6).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._velocity(q, v, out)) is not None:
             return result
-        return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
+        return self._compute_array("velocity", (q, v), frame, reference, base, out, verify, threads)
 
     def jacobian(
         self,
@@ -875,10 +875,10 @@ class Robot(Displayable):
         >>> J[:2].round(6).tolist()
         [[-0.4, -0.4], [0.5, 0.0]]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._jacobian(q, out)) is not None:
             return result
-        return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
+        return self._compute_array("jacobian", (q,), frame, reference, base, out, verify, threads)
 
     def jacobian_rate(
         self,
@@ -905,7 +905,7 @@ class Robot(Displayable):
         >>> arm.jacobian_rate([0.0, 0.0], [1.0, 0.0], "tip")[0].tolist()  # of the x row, 1/s
         [-0.9, -0.4]
         """
-        return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
+        return self._compute_array("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 
     def hessian(
         self,
@@ -946,10 +946,10 @@ class Robot(Displayable):
         >>> H[0].tolist()  # x row, m/rad: the second derivatives of x = 0.5 cos q1 + 0.4 cos(q1 + q2)
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._hessian(q, out)) is not None:
             return result
-        return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
+        return self._compute_array("hessian", (q,), frame, reference, base, out, verify, threads)
 
     def acceleration(
         self,
@@ -978,10 +978,10 @@ class Robot(Displayable):
         >>> arm.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(6).tolist()  # -w^2 r, r = 0.9 m
         [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._acceleration(q, v, a, out)) is not None:
             return result
-        return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
+        return self._compute_array("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
     def imu(
         self,
@@ -1017,7 +1017,7 @@ class Robot(Displayable):
         g = vectors(gravity, "gravity")
         if g.shape != (3,):
             raise InputError("gravity must be one vector (3,)", found=f"shape {g.shape}")
-        return self._computed(
+        return self._compute_array(
             "imu", (q, v, a), frame, Reference.LOCAL, base, out, verify, threads, gravity=g.tolist()
         )
 
@@ -1073,7 +1073,7 @@ class Robot(Displayable):
             self.rate_names,
             axis_kinds(self.tree),
             active,
-            partial(self._sampled, frame),
+            partial(self._sample_jacobians, frame),
             moving_base=base is not None,
         )
         return singular_values(J, error, active[which].any(axis=0), which, columns)
@@ -1291,7 +1291,7 @@ class Robot(Displayable):
         prepared.always_load = True
         return prepared
 
-    def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
+    def compile(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """Return the fastest evaluator of one frame: machine code for this robot.
 
         At the first call of a quantity, the system's C compiler compiles the code in a few seconds. A cache
@@ -1308,7 +1308,7 @@ class Robot(Displayable):
             VerificationError: at the first call, if Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
@@ -1607,7 +1607,7 @@ class Robot(Displayable):
             plan = self._plans[key] = compile_tree(self.tree, key)
         return plan
 
-    def _computed(
+    def _compute_array(
         self,
         name: str,
         inputs: Sequence[Given],
@@ -1639,13 +1639,13 @@ class Robot(Displayable):
         self.verifier.check(row, call, result, verify)
         return result
 
-    def _sampled(self, frame: str) -> FloatArray:
+    def _sample_jacobians(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
         J: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
         return J[:, 0]
 
-    def _fast(
+    def _find_evaluator(
         self,
         frame: str | Sequence[str] | None,
         reference: Reference | str,
@@ -1690,7 +1690,7 @@ _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
-def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
+def _merge_shared_items(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return a method's docstring, completed with the arguments and errors in `shared` and `errors`.
 
     The shape, the units and the equations of the result come from `QUANTITIES`.
@@ -1700,20 +1700,20 @@ def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, s
     own = {"Args": "", "Returns": "", "Raises": ""} | dict(zip(parts[::2], parts[1::2], strict=True))
     code, described = method.__code__, shared | dict(_ITEM.findall(own["Args"]))
     names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
-    own["Args"] = _indented([f"{name}: {described[name]}" for name in names])
+    own["Args"] = _indent_items([f"{name}: {described[name]}" for name in names])
     row = next((row for row in QUANTITIES.values() if row.method == method.__name__), None)
     if row is not None:
         shape, units = ", ".join(map(str, row.shape)), [f"{x} in {unit}" for x, unit in row.units.items()]
         result = "; ".join((f"(..., {shape}), or (..., frames, {shape}) for a list of frames", *units))
         source = f"Equation{'s' * (len(row.equations) > 1)} {', '.join(row.equations)}."
-        own["Returns"] = _indented([f"{own['Returns'] or f'{result}.'} {source}"])
+        own["Returns"] = _indent_items([f"{own['Returns'] or f'{result}.'} {source}"])
     raised = dict(_ITEM.findall(own["Raises"]))
-    own["Raises"] = _indented([f"{name}: {words}" for name, words in (raised | errors | raised).items()])
+    own["Raises"] = _indent_items([f"{name}: {words}" for name, words in (raised | errors | raised).items()])
     sections = (f"\n\n{title}:\n{section}" for title, section in own.items() if section)
     return "".join((text, *sections, start, example))
 
 
-def _indented(items: Sequence[str]) -> str:
+def _indent_items(items: Sequence[str]) -> str:
     lines = (" ".join(item.split()) for item in items)
     return "\n".join(fill(x, 98, initial_indent=4 * " ", subsequent_indent=8 * " ") for x in lines)
 
@@ -1723,7 +1723,7 @@ def _complete_docstrings() -> None:
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():
         if isinstance(method, FunctionType) and "threads" in method.__code__.co_varnames and method.__doc__:
-            method.__doc__ = _completed(method, *shared)
+            method.__doc__ = _merge_shared_items(method, *shared)
 
 
 _complete_docstrings()

@@ -74,7 +74,7 @@ def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
 
     The motion `x` has one sample in LOCAL_WORLD_ALIGNED. An acceleration of at most 1e-9 m/s^2 has no arrow.
     """
-    parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
+    parts = np.vstack([x.breakdown.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
     names = tuple(name for name, used in zip((*ACCELERATION_KINDS, "sum"), keep, strict=True) if used)
     return _arrows(x, parts[keep], [PART_COLOURS[name] for name in names], names, reach)

@@ -232,8 +232,8 @@ def numbers(x: FrameMotion) -> str:
 
 
 def check_line(x: FrameMotion) -> str:
-    if x.not_verified is not None:
-        return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
+    if x.unverified_reason is not None:
+        return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.unverified_reason)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
     mark = "**✓ verified** by" if x.agrees else "**✗ disagrees** with"
     return f"{mark} Pinocchio {version()}, eps·scale: {figures}"
