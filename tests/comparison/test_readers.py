@@ -57,7 +57,7 @@ def test_a_changed_element_is_named(
 ) -> None:
     text = TEXTS["two revolute"]
     assert text.count(change[0]) == 1
-    monkeypatch.setattr(readers, "_source", lambda _: (text.replace(*change), "urdf"))
+    monkeypatch.setattr(readers, "_library_input", lambda _: (text.replace(*change), "urdf"))
     (found,) = compare_readers(urdfkin.load(text), ["pinocchio"])
     (one,) = found.differences
     assert (one.joint, one.element) == ("j2", element)
@@ -132,7 +132,7 @@ def from_usd(path: Path, text: str) -> urdfkin.Robot:
 def let_newton_read(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the library read another text than urdfkin has read."""
     path.write_text(text)
-    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    monkeypatch.setattr(readers, "_library_input", lambda _: (str(path), "usd"))
 
 
 def test_a_usd_file_is_read_by_newton_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,7 +213,7 @@ def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "its process ended with -11"
     monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "sleep 20"])
-    monkeypatch.setattr(readers, "_PATIENCE", 0.2)
+    monkeypatch.setattr(readers, "_TIMEOUT", 0.2)
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
 
 

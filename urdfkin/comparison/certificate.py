@@ -10,7 +10,7 @@ import numpy as np
 
 from urdfkin.comparison.bounds import DistanceSearch, own_poses, pinocchio_poses, tighten
 from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
-from urdfkin.comparison.verdict import CONFIRMED, Comparator
+from urdfkin.comparison.verdict import CONFIRMATION_SAMPLES, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.mechanisms.matcher import align
@@ -31,10 +31,10 @@ from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, 
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
-MOST_AGAIN = 2**22
+MAX_RECHECK_BOXES = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
 #: The machine that wrote the certificate may have other rounding errors.
-_RELATIVE, _ZERO = 1e-9, 1e-15
+_RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound, in units of the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
@@ -217,6 +217,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
         "a": a,
         "b": b,
         **{name: getattr(result, name) for name in _COPIED},
+        "checked": result.confirmation,
         "rounding": dict(zip(("metres", "radians"), result.rounding, strict=True)),
     }
     return cast("SameCertificate", as_json_data(document))
@@ -225,11 +226,11 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
 #: Attributes of `Sameness` that the certificate contains under the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
-    "as_written", "checked",
+    "as_written",
 )  # fmt: skip
 
 
-def words_of(entry: DifferenceEntry) -> str:
+def difference_text(entry: DifferenceEntry) -> str:
     a, b = (
         Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
         for x in (entry["a"], entry["b"])
@@ -266,7 +267,7 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
 
 
 def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
-    choices = _choices(document)
+    choices = _read_choices(document)
     if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
@@ -307,15 +308,15 @@ def _statement_errors(document: SameCertificate, comparator: Comparator, result:
     claimed = {(one["place"], one["what"]): one for one in document["differences"]}
     for key, one in expected.items():
         if key not in claimed:
-            yield f"`differences`: this difference is missing: {words_of(one)}"
+            yield f"`differences`: this difference is missing: {difference_text(one)}"
     for key, one in claimed.items():
         if key not in expected:
-            yield f"`differences`: this is not a difference: {words_of(one)}"
+            yield f"`differences`: this is not a difference: {difference_text(one)}"
     if len(claimed) < len(document["differences"]):
         yield "`differences`: an entry is listed twice"
     for key, one in claimed.items():
         if key in expected and not _same_difference(one, expected[key], result.rounding):
-            yield f"`differences`: the size or a value is wrong in: {words_of(one)}"
+            yield f"`differences`: the size or a value is wrong in: {difference_text(one)}"
     if not _equal(document["tools"], correct["tools"], max(result.rounding)):
         yield "`tools`: the entries differ from those computed from the models"
     if document["verdict"] != result.verdict.value:
@@ -332,8 +333,12 @@ def _same_difference(
 ) -> bool:
     return (
         all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
-        and math.isclose(claimed["metres"], expected["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
-        and math.isclose(claimed["radians"], expected["radians"], rel_tol=_RELATIVE, abs_tol=rounding[1])
+        and math.isclose(
+            claimed["metres"], expected["metres"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[0]
+        )
+        and math.isclose(
+            claimed["radians"], expected["radians"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[1]
+        )
     )
 
 
@@ -344,19 +349,19 @@ def _confirmation_errors(
     if state != "confirmed" and reason and claimed == as_json_data(Confirmation(state, reason=reason)):
         return
     known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
-    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:
+    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMATION_SAMPLES or not known:
         yield (
-            f"`checked`: the entry must contain a confirmation at {CONFIRMED} configurations, or a reason"
-            " why there is none"
+            f"`checked`: the entry must contain a confirmation at {CONFIRMATION_SAMPLES} configurations,"
+            " or a reason why there is none"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
     rounding = comparator.rounding(alignment, variables)[0]
-    if not math.isclose(claimed["metres"], metres, rel_tol=_RELATIVE, abs_tol=rounding):
+    if not math.isclose(claimed["metres"], metres, rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding):
         yield f"`checked`: Pinocchio finds at most {metres:.2g} m, not {claimed['metres']:.2g} m"
 
 
-def _choices(document: SameCertificate) -> AlignmentChoices:
+def _read_choices(document: SameCertificate) -> AlignmentChoices:
     joints, base = document["joints"], document["base_links"]
     return AlignmentChoices(
         (base[0], base[1]),
@@ -394,7 +399,7 @@ def _choices_error(
     return None
 
 
-def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
+def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
     """Compare two entries; the last digits of numbers may differ."""
     if isinstance(expected, dict):
         return (
@@ -409,14 +414,14 @@ def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
             and all(_equal(*pair, zero) for pair in zip(claimed, expected, strict=True))
         )
     if isinstance(expected, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, expected, rel_tol=_RELATIVE, abs_tol=zero)
+        return math.isclose(claimed, expected, rel_tol=_RELATIVE_TOLERANCE, abs_tol=zero)
     return bool(claimed == expected)
 
 
 def _as_written_errors(
     claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    written = comparator.as_written(alignment)
+    written = comparator.align_as_written(alignment)
     if claim is None:
         if written.frames:
             yield "`as_written` is missing; it must contain the largest distance between the unchanged models"
@@ -429,7 +434,7 @@ def _as_written_errors(
         return
     search = comparator.search(written, variables, as_written=True)
     rounding = comparator.rounding(written, variables)
-    distances = search.sampled_distances(written.frames)[0].max(axis=0)
+    distances = search.sample_distances(written.frames)[0].max(axis=0)
     if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
         farthest = links[0][written.frames[int(distances.argmax())].a]
         yield f"`as_written`: frame {farthest} has a larger distance, {distances.max():.6g} m"
@@ -470,12 +475,12 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
+        attained = max(claim["lower"], float(search.sample_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
         if not search.unbounded:
-            proven = tighten(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+            proven = tighten(search, frame, metres, proven[0], MAX_RECHECK_BOXES), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
     yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"

@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion, Verdict, angle, length, up_to
+from urdfkin.comparison.result import (
+    BOUNDED_DIFFERENCES,
+    Interval,
+    Sameness,
+    SameQuestion,
+    Verdict,
+    angle,
+    length,
+    up_to,
+)
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
@@ -47,8 +56,8 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if question.within is not None:
         return _within(found, question.within) + besides
     off = "the distance of the frames has no bound"
-    if math.isfinite(max(found.written)):
-        off = f"in every configuration no frame is off by more than {_both(*found.written)}"
+    if math.isfinite(max(found.bound_as_written)):
+        off = f"in every configuration no frame is off by more than {_both(*found.bound_as_written)}"
     if found.up_to_single:
         cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
@@ -73,15 +82,17 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 def _within(found: Sameness, most: float) -> str:
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
-        return f"{limit}no frame is ever off by more than {_both(*found.written)}"
-    if (beyond := next((one for one in found.differences if one.what not in BOUNDED), None)) is not None:
+        return f"{limit}no frame is ever off by more than {_both(*found.bound_as_written)}"
+    if (
+        beyond := next((one for one in found.differences if one.what not in BOUNDED_DIFFERENCES), None)
+    ) is not None:
         return f"NOT {limit}{beyond.words}"
     frames = (found.as_written,) if found.as_written is not None else found.frames
     far = [one for one in frames if one.lower > most or one.radians_seen > most]
     if far:
         worst = max(far, key=lambda one: (one.lower, one.radians_seen))
         return f"NOT {limit}{worst.frame} is {_off(worst, found.rounding)} off"
-    return f"NOT {limit}the proven bound is {_both(*found.written)}"
+    return f"NOT {limit}the proven bound is {_both(*found.bound_as_written)}"
 
 
 def _both(metres: float, radians: float) -> str:
@@ -196,7 +207,7 @@ def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool
     parts += _lines(NARROWED, found.narrowed, some)
     parts += _lines("different names", renamed(found), some)
     parts += _lines("differences without effect on motion", [one.words for one in found.remarks], some)
-    return TextDocument("", [*parts, str(found.checked)])
+    return TextDocument("", [*parts, str(found.confirmation)])
 
 
 def _names(found: Sameness) -> list[str]:
@@ -225,7 +236,7 @@ def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[
             words = "differs within single precision"
         if question.within is not None:
             words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
-        metres, radians = one.written
+        metres, radians = one.bound_as_written
         off = "no bound" if math.isinf(metres) else _both(metres, radians)
         single = "" if one.single is None else _both(*one.single)
         rows.append((*one.sources, words, off, single))
@@ -261,7 +272,7 @@ def as_document(found: Sameness) -> TextDocument:
         parts += [f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         parts += _worst_case(found, frames)
-    return TextDocument(headline(found), [*parts, str(found.checked)])
+    return TextDocument(headline(found), [*parts, str(found.confirmation)])
 
 
 def attained(frame: Interval) -> str:
@@ -304,7 +315,7 @@ def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if frames:
         cells = (map(text, row) for row in rows(frames[: 4 * SHOWN]))
         lines += [f"{farthest(found)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
-    return "\n".join([*lines, text(str(found.checked)), ""])
+    return "\n".join([*lines, text(str(found.confirmation)), ""])
 
 
 #: Half the side length of a picture (units of the SVG), and fraction of the picture that the robots fill.
