@@ -34,7 +34,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Configurations",
         "Joint values `q`: named poses, samples, limits, integration, and the conversion to other tools.",
         "neutral poses sample limit_violations integrate difference to_pinocchio from_pinocchio "
-        "pinocchio_model convention with_convention locked",
+        "pinocchio_model convention with_convention with_locked_joints",
     ),
     "api/kinematics.md": (
         "Kinematics",
