@@ -110,8 +110,8 @@ ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
         _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
     QuestionsSection.LOCKED_JOINTS: [
-        _raised(lambda: urdfkin.load("panda").locked("ready")),
-        _raised(lambda: _ur5().locked({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
+        _raised(lambda: urdfkin.load("panda").with_locked_joints("ready")),
+        _raised(lambda: _ur5().with_locked_joints({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
     ],
     QuestionsSection.DEGREES: [lambda: _warned(lambda: _ur5().integrate(np.full(6, 40.0), np.zeros(6)))],
     QuestionsSection.SINGULARITY: [_typed("singular-values", "--help")],

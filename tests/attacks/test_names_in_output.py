@@ -177,7 +177,7 @@ def test_a_name_in_markdown_is_one_code_element_or_one_paragraph(kind: str) -> N
 @pytest.mark.parametrize("form", ["markdown", "terminal"])
 def test_a_table_of_the_whole_tree_has_the_same_lines_with_any_names(form: str) -> None:
     texts = [
-        document(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).written(form)
+        document(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).render(form)
         for names in (list(IN_XML.values()), [f"n{k}" for k in range(len(IN_XML))])
     ]
     assert texts[0].count("\n") == texts[1].count("\n")

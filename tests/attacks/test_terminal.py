@@ -275,14 +275,14 @@ def test_a_log_command_written_in_pieces_is_escaped(step: int) -> None:
 def test_all_output_of_the_command_line_passes_the_safe_stream() -> None:
     # Only whole documents, which contain escaped names, are printed by `click.echo`.
     allowed = {
-        "streams.py": ("click.echo(printable(line)",),
+        "streams.py": ("click.echo(escape_unprintable(line)",),
         "explain.py": (
             "click.echo(equation)", "click.echo(as_text(", "click.echo(explain(", 'click.echo(f"{rule.id}',
             'click.echo(f"questions: ',
         ),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "options.py": ("click.echo(getattr(importlib.import_module(module), name).schema_text()",),
-        "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
+        "__init__.py": ('click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip
     way = r"\bclick\.echo\(|\bprint\(|Console\(|sys\.stdout\.write"

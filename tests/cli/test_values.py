@@ -355,9 +355,11 @@ def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
     found = urdfkin("placement panda", *words, "--q", "0.1,0.2", "--format", "json").data
-    robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
+    robot = library.load("panda").with_locked_joints(
+        "ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"]
+    )
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
-    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
+    robot = library.load("panda").with_locked_joints({"panda_joint4": -1.0 / 3.0})
     replay = robot.origin.command_line.split()
     assert replay == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
     found = urdfkin("placement", *replay, "--q", "ready", "--format", "json").data

@@ -185,7 +185,7 @@ def test_free_joints_with_a_different_zero_pose_are_equivalent(kind: str, also: 
     assert found.verdict is Verdict.SAME_AFTER
     assert any("the pose of q[" in line for line in found.after)
     assert moves_alike(found, a, b)
-    assert "within the bounds" in str(found.checked)
+    assert "within the bounds" in str(found.confirmation)
     assert found.as_written is not None
     assert certified(found, a, b)
 

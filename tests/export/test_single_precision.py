@@ -215,7 +215,7 @@ def test_the_bounds_of_a_file_include_the_conversion_errors_of_large_angles_and_
     text = _TURNED.format(**usual | {large: f"{1e7 + 1e-3 * seed:.4f}"})
     robot = loaded(text)
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
-    held = robot.locked({"j": 0.7})
+    held = robot.with_locked_joints({"j": 0.7})
     assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
     right = conversion
     monkeypatch.setattr(proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTORS)))
@@ -236,7 +236,7 @@ def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
 ) -> None:
     robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
     right = conversion
-    for one in (robot, robot.locked({"j": 0.7})):
+    for one in (robot, robot.with_locked_joints({"j": 0.7})):
         with monkeypatch.context() as patch:
             assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
             patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=np.zeros(1)))

@@ -201,10 +201,10 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from urdfkin.system.lazy_import import own_version
+    from urdfkin.system.lazy_import import urdfkin_version
     from urdfkin.verify.pinocchio import pinocchio, version
 
-    click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
+    click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()}")
     # If Pinocchio is not installed, this call raises an error.
     pinocchio()
     ctx.exit()

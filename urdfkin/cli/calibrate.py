@@ -235,11 +235,11 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     if text is None:
         return None
-    metres, radians = numbers(text.split(","), "--noise", ["metres", "radians"])
+    metres, radians = parse_numbers(text.split(","), "--noise", ["metres", "radians"])
     return metres, radians
 
 

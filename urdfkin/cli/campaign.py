@@ -17,7 +17,7 @@ import click
 from urdfkin.cli.options import FOLDER
 from urdfkin.cli.output import console
 from urdfkin.cli.streams import say
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
     from urdfkin.validation.collector import CampaignProgress, Progress
@@ -137,7 +137,7 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         def tell(state: CampaignProgress) -> None:
             speed = _speed(state, pace)
             words = f"{state.robots_done}/{state.robots} robots, {speed}{_failures(state)},"
-            done, label = state.chunks_done, printable(state.label)
+            done, label = state.chunks_done, escape_unprintable(state.label)
             bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
         yield tell

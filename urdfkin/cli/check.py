@@ -30,8 +30,8 @@ from urdfkin.cli.output import counted, write_output
 from urdfkin.cli.shell import complete_code, complete_file
 from urdfkin.cli.streams import command_lines, harmless, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
-from urdfkin.system.git import Version, version_before
+from urdfkin.system.files import read_bytes, read_start, require_regular_file, write_file
+from urdfkin.system.git import CommitFiles, merge_base_files
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits
@@ -352,7 +352,7 @@ def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
         fix=options["fix"],
         diff=options["diff"],
         unsafe=options["unsafe_fixes"],
-        version=None if since is None else version_before(since, Path()),
+        version=None if since is None else merge_base_files(since, Path()),
         accepts_all=writing,
     )
 
@@ -380,7 +380,7 @@ class CheckRun:
     fix: bool
     diff: bool
     unsafe: bool
-    version: Version | None
+    version: CommitFiles | None
     accepts_all: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
     _seen: set[str] = field(default_factory=set)
@@ -399,7 +399,7 @@ class CheckRun:
                 try:
                     # A file that the user named directly may be a pipe.
                     if file not in (word, f"./{word}"):
-                        demand_regular(Path(file))
+                        require_regular_file(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
                     self.outcome.errors.append(error)
@@ -444,18 +444,18 @@ class CheckRun:
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
         self.outcome.add(file, Examination(text, data, None, findings, ()))
 
-    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
+    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
         """Return whether a file, and each file that it may include, is the same as in `version`.
 
         Every file of `version` with a suffix in `suffixes` counts as included. A deleted file also counts as
         included if its name occurs in the text.
         """
         if suffixes not in self._changed:
-            self._changed[suffixes] = version.changed(suffixes)
+            self._changed[suffixes] = version.has_changes(suffixes)
         if self._changed[suffixes]:
             return False
         data = read_bytes(Path(file))
-        return version.holds(data) and not any(os.fsencode(name) in data for name in version.gone)
+        return version.contains(data) and not any(os.fsencode(name) in data for name in version.missing_names)
 
     def _fix(self, file: str, text: UrdfText, choose: Any) -> UrdfText:
         path = None if text.entry is not None or is_xacro(text.source) else find_local_path(text)

@@ -38,7 +38,7 @@ from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import draw_samples
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home
+from urdfkin.system.files import expand_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
@@ -138,7 +138,7 @@ def _write_tables(request: DHRequest) -> Answer:
 def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
-        table = read_table_or_screws(at_home(request.unchanged))
+        table = read_table_or_screws(expand_home(request.unchanged))
         # If the file contains screws, `Robot.dh` derives a table at the end of this function.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
@@ -182,7 +182,7 @@ def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -
 def _locked_lines(request: DHRequest) -> list[str]:
     form = request.format_ if request.format_ in _PRINTED else "terminal"
     line = locked_line(request.robot)
-    return [TextDocument("", [line]).written(form).rstrip("\n")] if line else []
+    return [TextDocument("", [line]).render(form).rstrip("\n")] if line else []
 
 
 # -- the whole tree ------------------------------------------------------------------------------------
@@ -197,7 +197,7 @@ def _write_tree(request: DHRequest) -> Answer:
     elif format_ == "csv":
         text = as_csv(parameters)
     else:
-        text = tree_document(parameters, request.units).written(format_)
+        text = tree_document(parameters, request.units).render(format_)
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
     check_line = "\n".join([str(check or check_of_path(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
@@ -241,7 +241,7 @@ def _compare(request: DHRequest, name: str) -> Answer:
         hints = ["", f"hint: {mistake}"] if mistake else []
         lock = [line] if (line := locked_line(request.robot)) else []
         parts = [*notes, *lock, Strong(document.title), *document.parts, *hints]
-        text = TextDocument("", parts).written(request.format_)
+        text = TextDocument("", parts).render(request.format_)
     return _answer(request, text, 0 if found.passes else 1)
 
 

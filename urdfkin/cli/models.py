@@ -123,17 +123,17 @@ def same_command(
     differences without effect on motion, such as limits. 2: bad input. With --within, the command does not
     change B before the comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
-    from urdfkin.comparison.bounds import MOST_BOXES
+    from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate
     from urdfkin.comparison.result import SameQuestion
-    from urdfkin.comparison.verdict import parse_map, same
+    from urdfkin.comparison.verdict import parse_joint_pairs, same
     from urdfkin.model.conventions import as_toml
     from urdfkin.report.same import as_html, command_of, document, markdown_of
 
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
-    question, most_boxes = SameQuestion(within, strict), MOST_BOXES if boxes is None else boxes
+    question, most_boxes = SameQuestion(within, strict), MAX_BOXES if boxes is None else boxes
     if more:
         reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
         return _all_pairs((a, b, *more), question, most_boxes)
@@ -142,7 +142,7 @@ def same_command(
     with report_compilation():
         if recheck is not None:
             return _recheck(robots, recheck)
-        found = same(*robots, map=parse_map(pairs), boxes=most_boxes, within=within)
+        found = same(*robots, map=parse_joint_pairs(pairs), boxes=most_boxes, within=within)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
     forms: dict[str, Callable[[], str]] = {
@@ -182,13 +182,15 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
-    from urdfkin.comparison.certificate import SAME, recheck, words_of
+    from urdfkin.comparison.certificate import SAME, difference_text, recheck
 
     certificate = SAME.read(path)
     errors = recheck(certificate, *robots)
     for line in errors:
         say(line, err=True)
-    first = [f"; first difference: {words_of(difference)}" for difference in certificate["differences"][:1]]
+    first = [
+        f"; first difference: {difference_text(difference)}" for difference in certificate["differences"][:1]
+    ]
     holds = f"the certificate holds: {certificate['verdict']}{''.join(first)}"
     words = "the certificate does not hold" if errors else holds
     code = int(bool(errors) or certificate["verdict"] == "differs")

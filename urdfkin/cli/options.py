@@ -19,9 +19,9 @@ import click
 from urdfkin.cli.shell import complete_frame, complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
-from urdfkin.errors.numbers import parse_float, parse_int, remedy
+from urdfkin.errors.numbers import number_remedy, parse_float, parse_int
 from urdfkin.model.reference import Reference
-from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
+from urdfkin.system.files import MAX_DATA_BYTES, read_standard_input, read_text, shorten_path
 from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class WholeNumber(click.IntRange):
 class FiniteNumber(click.types.FloatParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_float(value) is None:
-            hint = remedy(value)
+            hint = number_remedy(value)
             self.fail(f"{value!r} is not a finite number{f': {hint}' if hint else ''}.", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -71,7 +71,7 @@ def format_from_suffix(
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
-                where=shortened(output),
+                where=shorten_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
         return format_ if chosen else without_suffix
@@ -326,7 +326,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 def warn_of_motion(motion: Trajectory) -> None:
     for note in motion.notes:
         say(f"warning: {note}", err=True)
-    if motion.rates != "as given":
+    if motion.rates_source != "as given":
         say(f"rates {motion.derivation()}", err=True)
 
 
@@ -501,10 +501,10 @@ def read_batch(
     """
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_columns, width_of
+    from urdfkin.robot.trajectory import count_cells, read_columns
 
-    text = _read_stdin() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
-    width = width_of(text, str(path)) if len(layouts) > 1 else None
+    text = _read_stdin() if str(path) == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
+    width = count_cells(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
     rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
@@ -519,7 +519,7 @@ def read_batch(
 
 def _read_stdin() -> str:
     try:
-        return read_standard_input(MOST_DATA).decode("utf-8-sig")
+        return read_standard_input(MAX_DATA_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"text that is not UTF-8 ({error})") from None
 
@@ -581,13 +581,13 @@ def with_base(
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
     import numpy as np
 
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)
     cells = text.split(",")
     names = next((names for names in layouts if len(names) == len(cells)), layouts[0])
-    return np.array([numbers(cells, option, names)]), names
+    return np.array([parse_numbers(cells, option, names)]), names
 
 
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:

@@ -92,7 +92,7 @@ class Answer:
         document = self.document()
         if self.check:
             document = replace(document, parts=[*document.parts, self.check])
-        return document.written(form), True
+        return document.render(form), True
 
     def write(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
         if form == forms[0] and output is None and form not in self.data:

@@ -29,7 +29,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import TEXTS, Answer, check_of_path, writes_answer
 from urdfkin.errors import InputError
-from urdfkin.errors.display import Table, TextDocument, six_digits
+from urdfkin.errors.display import Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _kind_of_joint(joint: Any) -> str:
 
 
 def _vector(numbers: FloatArray) -> str:
-    return " ".join(six_digits(x) for x in numbers.tolist())
+    return " ".join(format_number(x) for x in numbers.tolist())
 
 
 SCREW_FORMATS = ("terminal", "markdown", "html", "latex", "toml", "json", "numpy", "matlab")
@@ -188,7 +188,7 @@ def structure_command(
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
     from urdfkin.dh.structure import opw_of, structure
-    from urdfkin.system.documents import plain
+    from urdfkin.system.documents import as_json_data
     from urdfkin.verify.conversions import check_opw, check_screws
 
     if opw is not None:
@@ -198,7 +198,7 @@ def structure_command(
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
-        data = {"json": lambda: plain(found) | locked_joints(loaded)}
+        data = {"json": lambda: as_json_data(found) | locked_joints(loaded)}
         return Answer(
             lambda: _with_locked_joints(_structure_document(found), loaded), data, *check_of_path(check)
         )
@@ -225,12 +225,12 @@ def _structure_document(found: Structure) -> TextDocument:
     if found.pairs:
         rows = []
         for pair in found.pairs:
-            angle = six_digits(math.degrees(pair.angle), 1e-9)
-            distance = six_digits(pair.distance * 1e3, 1e-9)
+            angle = format_number(math.degrees(pair.angle), 1e-9)
+            distance = format_number(pair.distance * 1e3, 1e-9)
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    point = ", ".join(six_digits(x, 1e-12) for x in found.reach_from)
+    point = ", ".join(format_number(x, 1e-12) for x in found.reach_from)
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
         f"reach: {found.reached:.4g} m on samples{bound}, measured from ({point}) m, {found.reach_point}",
@@ -245,4 +245,4 @@ def _kind_line(kind: StructureKind) -> str:
     line = f"{kind.name}: {', '.join(kind.joints)}, {'exactly' if kind.is_exact else deviation}"
     if kind.at is None:
         return line
-    return f"{line}, centre ({', '.join(six_digits(x, 1e-12) for x in kind.at)}) m at zero"
+    return f"{line}, centre ({', '.join(format_number(x, 1e-12) for x in kind.at)}) m at zero"

@@ -42,7 +42,7 @@ from urdfkin.cli.options import (
     with_base,
 )
 from urdfkin.cli.output import TEXTS, Answer, check_line, exit_code, report_compilation, writes_answer
-from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
+from urdfkin.errors.display import NOISE_FRACTION, Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
@@ -96,7 +96,7 @@ def _read_trajectory(
 ) -> Inputs:
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_samples, with_rates
+    from urdfkin.robot.trajectory import complete_rates, read_samples
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
@@ -106,9 +106,9 @@ def _read_trajectory(
     settings = locked_joints(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
-        motion = with_rates(robot.tree, x)
+        motion = complete_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
-        settings["derivatives"] = motion.rates
+        settings["derivatives"] = motion.rates_source
         warn_of_motion(motion)
     warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
@@ -276,7 +276,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
-    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
+    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE_FRACTION * np.abs(value).max(initial=0.0)
     pairs = zip(*np.nonzero(seen), strict=True)
     rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in pairs]
     return Table(("column", "changed by", *quantity.labels), rows, left=2, names=(0, 1))
@@ -286,15 +286,15 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    from urdfkin.compiled.breakdown import KINDS
+    from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 
     heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
 
     def table(k: int) -> Iterator[Table]:
-        noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
+        noise = NOISE_FRACTION * float(abs(found.terms[k]).max(initial=0.0))
         rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
         # With four digits, a row fits on a terminal.
-        cells = [(*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
+        cells = [(*names, *(format_number(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
         yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
@@ -313,7 +313,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def data() -> dict[str, Any]:
         about = {"quantity": "acceleration breakdown", "frame": x.frame, "reference": reference}
-        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(KINDS)}
+        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(ACCELERATION_KINDS)}
         return _head(x, "qva", **about, **axes) | {
             name: getattr(found, name).tolist() for name in ("base", "terms", "total")
         }
@@ -485,10 +485,10 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     or by arrays in the .npz file. With --root-joint floating, the pose of the root link is part of --q. See
     `urdfkin explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     x = _read_options()
-    g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
+    g = parse_numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with report_compilation():
         return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
 
@@ -526,7 +526,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
-    from urdfkin.system.documents import plain
+    from urdfkin.system.documents import as_json_data
 
     x = _read_options()
     with report_compilation():
@@ -549,10 +549,10 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     def data() -> dict[str, Any]:
         return _head(x, "q", quantity="singular values", frame=x.frame, rows=rows) | {
-            "singular_values": plain(found.values._asdict()),
-            "condition": plain(found.condition._asdict()),
-            "manipulability": plain(found.manipulability._asdict()),
-            "manipulability_gradient": plain(gradient),
+            "singular_values": as_json_data(found.values._asdict()),
+            "condition": as_json_data(found.condition._asdict()),
+            "manipulability": as_json_data(found.manipulability._asdict()),
+            "manipulability_gradient": as_json_data(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
                 if one

@@ -83,8 +83,11 @@ def info_command(robot: str) -> Answer:
     lines before their names mark the children.
     """
     loaded = load_robot(robot)
-    data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
-    return Answer(loaded._sheet, data, fitted=lambda out: _fitted(out, loaded._sheet()))
+    data = {
+        "json": lambda: _describe(loaded),
+        "csv": lambda: _rows(loaded._text_document(), loaded.tree.links),
+    }
+    return Answer(loaded._text_document, data, fitted=lambda out: _fitted(out, loaded._text_document()))
 
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:

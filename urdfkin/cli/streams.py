@@ -23,7 +23,7 @@ from typing import Any, TextIO
 import click
 
 from urdfkin.errors import DegreesWarning, SourceError
-from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
+from urdfkin.errors.escape import CI_COMMAND_ANYWHERE, CI_COMMANDS, escape_sequence, escape_unprintable
 
 #: Exit code of shells for a program that writes to a closed pipe
 READER_GONE = 128 + signal.SIGPIPE
@@ -141,7 +141,9 @@ class SafeStream:
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        self._write_raw(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
+        self._write_raw(
+            CI_COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape_sequence("["), _plain(text))
+        )
 
     def write_file(self, text: str) -> None:
         self.stream.flush()
@@ -175,12 +177,16 @@ class SafeStream:
     def _line_without_commands(self, piece: str) -> str:
         before = len(self._line)
         whole = self._line + piece
-        at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
+        at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
         # Only the last 16 characters of a long line are stored; an "x" replaces the text before them.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MOST_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
-        return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
+        return (
+            "".join(escape_sequence(c) if before + k in at else c for k, c in enumerate(piece))
+            if at
+            else piece
+        )
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
@@ -190,7 +196,7 @@ def _plain(text: str) -> str:
     """Escape unprintable characters as in JSON, TOML and Python, except line feeds and tabs."""
     if text.isprintable():
         return text
-    return "".join(c if c in "\n\t" or c.isprintable() else escape(c) for c in text)
+    return "".join(c if c in "\n\t" or c.isprintable() else escape_sequence(c) for c in text)
 
 
 def guard() -> None:
@@ -203,13 +209,14 @@ def guard() -> None:
 
 def say(line: str, *, err: bool = False) -> None:
     """Print one line with escaped control characters."""
-    click.echo(printable(line), err=err)
+    click.echo(escape_unprintable(line), err=err)
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
     stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
-        click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
+        click.style(escape_unprintable(text), **style) if stream.styled else escape_unprintable(text)
+        for text, style in words
     )
     stream.write("".join(texts) + "\n")
 

@@ -27,7 +27,7 @@ from urdfkin.cli.reports import FILES, report_options, say_written, write_report
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.quantities import compared, not_compared
 
@@ -271,7 +271,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
     try:
         from urdfkin.validation.cluster import connect_cluster
     except ImportError:
-        raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
+        raise InputError("--scheduler needs dask.distributed", remedy=install_command("cluster")) from None
     with connect_cluster(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 

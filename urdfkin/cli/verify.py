@@ -154,7 +154,7 @@ def verify_command(
 
 
 def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
-    documents = [check._sheet() for check in checks]
+    documents = [check._text_document() for check in checks]
     if len(documents) == 1:
         return documents[0]
     parts = [part for document in documents for part in (Strong(document.title), *document.parts, "")]

@@ -209,13 +209,13 @@ def plot_command(
         motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
     write_file(output, save(plot_motion(loaded, motion, trajectory_, panels), output))
     say(f"{loaded.name}: {motion.frame}: {caption(motion, trajectory_)}")
-    context.exit(3 if motion.not_verified is not None else 0 if motion.agrees else 1)
+    context.exit(3 if motion.unverified_reason is not None else 0 if motion.agrees else 1)
 
 
 def _line(
     robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
-    from urdfkin.robot.trajectory import line
+    from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = conversion_of(robot, convention)
     first, last = (
@@ -224,4 +224,4 @@ def _line(
     )
     if len(first) != 1 or len(last) != 1:
         raise InputError("--from and --to need one configuration each", found=f"{len(first)} and {len(last)}")
-    return line(robot, first[0], last[0], duration, samples)
+    return make_line_trajectory(robot, first[0], last[0], duration, samples)

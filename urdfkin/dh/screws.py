@@ -22,7 +22,7 @@ from urdfkin.dh.convert import UNBOUNDED_SLIDE, serial_tree
 from urdfkin.dh.export.text import pose_matrix
 from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
-from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, six_digits
+from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
@@ -86,7 +86,7 @@ class ProductOfExponentials(Displayable):
         path = f"{self.robot}: {self.base_frame} to {self.tip_frame}"
         return log_line(f"<ProductOfExponentials {path}, {len(self.joints)} joints>")
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         return screws_document(self, digits=6)
 
     @cached_property
@@ -232,7 +232,7 @@ def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocu
     heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for title, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
         cells = [
-            (str(i), joint.name, *(six_digits(x, digits=digits) for x in row))
+            (str(i), joint.name, *(format_number(x, digits=digits) for x in row))
             for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
         ]
         parts += ["", title, Table(heads, cells, left=(1,), names=(1,))]

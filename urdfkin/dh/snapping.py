@@ -30,7 +30,7 @@ from urdfkin.dh.table import (
     wrapped,
 )
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import real_number
+from urdfkin.errors.validators import as_finite_float
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, joints_between, make_chain
@@ -48,7 +48,7 @@ _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def check_tolerance(snap: float) -> float:
-    tolerance = real_number(snap, "snap")
+    tolerance = as_finite_float(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
         raise InputError(
             "`snap` must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap)

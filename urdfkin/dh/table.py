@@ -35,7 +35,7 @@ from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, freeze, is_bounded, is_rigid
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 
 
 class DHConvention(StrEnum):
@@ -405,7 +405,7 @@ class DHTable(Displayable):
         return self._in_form("html", units_of(angles, lengths, digits))
 
     def _in_form(self, form: str, units: Units) -> str:
-        return str(hook("a table in a form")(self, form, units)).rstrip("\n")
+        return str(get_hook("a table in a form")(self, form, units)).rstrip("\n")
 
     def _repr_html_(self) -> str:
         return self.to_html()

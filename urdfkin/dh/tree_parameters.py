@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import turned
+from urdfkin.compiled.plan import axis_pose
 from urdfkin.dh.common_normals import (
     AxisTransform,
     PoseTolerance,
@@ -208,7 +208,7 @@ def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
-        align = turned(joint)
+        align = axis_pose(joint)
         T_axis = T @ joint.T_parent_joint @ align
         noise, tilt = pose_tolerance(folded + 1, 0.0, length), tilt_of(T_axis)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0

@@ -17,7 +17,7 @@ from fractions import Fraction
 from numbers import Real
 
 from urdfkin.errors import InputError
-from urdfkin.errors.numbers import UNITS, in_radians
+from urdfkin.errors.numbers import UNITS, radians_from_degrees
 from urdfkin.errors.validators import safe_repr
 
 
@@ -146,7 +146,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     """Convert the cell `name` to metres or radians; 90 degrees become exactly math.pi / 2."""
     if name in ("a", "d"):
         return number / 1000.0 if units.counts_millimetres else number
-    return number if units.angles is Angles.RADIANS else in_radians(number)
+    return number if units.angles is Angles.RADIANS else radians_from_degrees(number)
 
 
 _PLAIN_TEXT = str.maketrans(

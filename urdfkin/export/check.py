@@ -21,7 +21,7 @@ from pathlib import Path
 
 from urdfkin.errors import InputError
 from urdfkin.system.files import read_text
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 
 #: Text in the first lines of every exported file.
 MARK = "straight-line code for this robot and frame"
@@ -135,7 +135,7 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
 def _run_imported(file: Path, text: str, folder: Path) -> Iterator[str]:
     copy = _copy(text, folder / "checked.py")
     code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
-    yield from _run(own_python(code), file, cwd=folder)
+    yield from _run(python_command(code), file, cwd=folder)
 
 
 def _run_octave(file: Path, text: str, folder: Path) -> Iterator[str]:

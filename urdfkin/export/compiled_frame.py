@@ -26,10 +26,10 @@ from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import in_blocks, is_staged
-from urdfkin.compiled.kernel_cache import compiling
-from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
-from urdfkin.compiled.prepared import Fast
+from urdfkin.compiled.evaluate import compute_in_blocks, uses_buffer
+from urdfkin.compiled.kernel_cache import compile_lock
+from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
+from urdfkin.compiled.prepared import FastFunction
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import InputLayout, advance, c_file, fill_template, reserve
 from urdfkin.export.code import FrameCode, unverified_code
@@ -38,8 +38,8 @@ from urdfkin.model.configuration import draw_samples, warn_of_degrees
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.cache import cache_folder, get, put
-from urdfkin.system.locks import importing, lock_over_forks
+from urdfkin.system.cache import make_cache_folder, read_cached_file, write_cached_file
+from urdfkin.system.locks import import_lock, make_fork_safe_lock
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
@@ -65,12 +65,12 @@ def library(code: FrameCode) -> ctypes.CDLL:
         raise NoCompilerError("cc is not installed")
     text = c_file(code) + _entry_point(code)
     flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
-    folder = cache_folder("library", [], text, *flags, _version(compiler), _processor())
-    data = get(folder / "machine.code") if folder else None
+    folder = make_cache_folder("library", [], text, *flags, _version(compiler), _processor())
+    data = read_cached_file(folder / "machine.code") if folder else None
     if data is None:
         data = _compile(text, [compiler, *flags])
         if folder:
-            put(folder / "machine.code", data)
+            write_cached_file(folder / "machine.code", data)
     return _load(data)
 
 
@@ -96,7 +96,7 @@ def _entry_point(code: FrameCode) -> str:
         "library.c",
         N=int(KernelArgs.N),
         OUT=int(KernelArgs.OUT),
-        STAGE=int(KernelArgs.STAGE),
+        STAGE=int(KernelArgs.BUFFER),
         title=code.name,
         name=function.name,
         passed=", ".join(widths),
@@ -166,11 +166,11 @@ def _processor() -> str:
 _MOST_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
-    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
+    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.BUFFER, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
 _Arguments = ctypes.c_int64 * len(KernelArgs)
 _DOUBLE = np.dtype(np.float64)
-_compiling = lock_over_forks()
+_compiling = make_fork_safe_lock()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
@@ -191,11 +191,11 @@ class _ExportedRobot(Protocol):
     @property
     def compute(self) -> Callable[..., FloatArray]: ...
     @property
-    def compiled(self) -> Callable[..., CompiledFrame]: ...
+    def compile(self) -> Callable[..., CompiledFrame]: ...
 
 
 class CompiledFrame:
-    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compiled`.
+    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compile`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
@@ -209,7 +209,7 @@ class CompiledFrame:
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
-    >>> fast, q = robot.compiled("tool0"), robot.sample(1000)
+    >>> fast, q = robot.compile("tool0"), robot.sample(1000)
     >>> fast.jacobian(q).shape
     (1000, 6, 6)
     """
@@ -220,16 +220,16 @@ class CompiledFrame:
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._batches: dict[str, Callable[[int], int] | None] = {}
         # The first call of each function compiles the machine code, or reads it from the cache.
-        self._placement: Fast = partial(self._first, "placement")
-        self._velocity: Fast = partial(self._first, "velocity")
-        self._jacobian: Fast = partial(self._first, "jacobian")
-        self._jacobian_rate: Fast = partial(self._first, "jacobian rate")
-        self._hessian: Fast = partial(self._first, "hessian")
-        self._acceleration: Fast = partial(self._first, "acceleration")
+        self._placement: FastFunction = partial(self._first, "placement")
+        self._velocity: FastFunction = partial(self._first, "velocity")
+        self._jacobian: FastFunction = partial(self._first, "jacobian")
+        self._jacobian_rate: FastFunction = partial(self._first, "jacobian rate")
+        self._hessian: FastFunction = partial(self._first, "hessian")
+        self._acceleration: FastFunction = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
         # Memory addresses are not valid in another process, so unpickling creates a new object.
-        return self._robot.compiled, (self.frame, self.reference)
+        return self._robot.compile, (self.frame, self.reference)
 
     def placement(
         self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
@@ -237,7 +237,7 @@ class CompiledFrame:
         """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
@@ -256,7 +256,7 @@ class CompiledFrame:
         """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
@@ -270,7 +270,7 @@ class CompiledFrame:
         """Return the Jacobian (..., 6, nv): eq. 7.85.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian([0.0, 0.0])[1].tolist()
         [0.9, 0.4]
         """
@@ -289,7 +289,7 @@ class CompiledFrame:
         """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian_rate([0.0, 0.0], [1.0, 0.0])[0].tolist()
         [-0.9, -0.4]
         """
@@ -303,7 +303,7 @@ class CompiledFrame:
         """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.hessian([0.0, 0.0])[0].tolist()
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
@@ -323,7 +323,7 @@ class CompiledFrame:
         """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0])[0].item()
         -0.9
         """
@@ -332,17 +332,17 @@ class CompiledFrame:
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
     def _first(self, name: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called
+        with compile_lock, import_lock:
+            from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
         # The fast function checks neither the norm of a quaternion nor the range of the results.
         needs_checks = self._tree.floating_joints or self._plan.is_large
-        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
-        compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
+        compute, task = wrap_c_function(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
@@ -431,11 +431,11 @@ class CompiledFrame:
             arguments[_N], arguments[_OUT] = len(part), address(part)
             # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
             # Therefore the buffer `stage` has extra space.
-            stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
+            stage = aligned_empty(LANES * part[0].size + LANES) if row.columns and uses_buffer(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if in_blocks(compute, inputs, out, threads):
+        if compute_in_blocks(compute, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

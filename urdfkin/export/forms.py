@@ -20,7 +20,7 @@ from urdfkin.export import FORMS, QUANTITIES
 from urdfkin.export.code import FrameCode, code_of
 from urdfkin.export.naming import all_safe, safe
 from urdfkin.model.reference import Reference
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 from urdfkin.urdf.findings import UrdfWarning
 
 
@@ -59,7 +59,7 @@ def code_of_chain(
         text = screws_document(chain).text()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UrdfWarning)  # The user did not write this URDF.
-        robot = hook("a robot of a source")(chain, verify=verify)
+        robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
     if quantities is None:

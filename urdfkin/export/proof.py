@@ -24,7 +24,7 @@ from urdfkin.model.configuration import draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.lazy_import import own_version
+from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
@@ -125,7 +125,7 @@ def prove(
     vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
-        urdfkin=own_version(),
+        urdfkin=urdfkin_version(),
         certificate=certificate,
         vectors=vectors,
         single=single,

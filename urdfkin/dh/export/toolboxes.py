@@ -31,7 +31,7 @@ from urdfkin.dh.export.text import latex_math, latex_pose, scaled_to_fit
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.structure import axes_and_vectors
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
-from urdfkin.errors.display import six_digits
+from urdfkin.errors.display import format_number
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
@@ -130,7 +130,7 @@ def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> 
         return _latex(screws, digits)
     if form in _EXACT_FORMS:
         return _EXACT_FORMS[form](screws)
-    return screws_document(screws, digits).written(form)
+    return screws_document(screws, digits).render(form)
 
 
 def _latex(screws: ProductOfExponentials, digits: int) -> str:
@@ -138,7 +138,7 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
     rows = []
     for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
-        cells = " & ".join(latex_math(six_digits(x, digits=min(digits, 6))) for x in row)
+        cells = " & ".join(latex_math(format_number(x, digits=min(digits, 6))) for x in row)
         rows.append(rf"  {i} & {latex_text(joint.name)} & {cells} \\")
     frame = [r"\begin{tabular}{rlrrrrrr}", r"  \toprule", f"  {heads}", r"  \midrule"]
     lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
