@@ -18,20 +18,31 @@ from urdfkin.dh.compare import (
     Mistake,
     TableComparison,
     compare,
-    convention_that_fits,
-    diagnose,
+    comparison_document,
     fast_fit_errors,
+    find_better_interpretation,
+    find_dh_convention,
 )
-from urdfkin.dh.compare import document as comparison_document
 from urdfkin.dh.convert import to_urdf
 from urdfkin.dh.export.data import to_mapping
-from urdfkin.dh.export.text import printed
-from urdfkin.dh.parse_table import published, read_mapping, read_table_or_screws, reference_path, table_of
-from urdfkin.dh.rows import last_digits
+from urdfkin.dh.export.text import measure_printed_table
+from urdfkin.dh.parse_table import (
+    parse_table_data,
+    read_mapping,
+    read_table_or_screws,
+    reference_path,
+    suggest_published_tables,
+)
+from urdfkin.dh.rows import half_digits_by_row
 from urdfkin.dh.snapping import snap_hint
-from urdfkin.dh.tree_parameters import as_csv, as_mapping, printed_tree, tree_parameters
-from urdfkin.dh.tree_parameters import document as tree_document
-from urdfkin.dh.units import Angles, Lengths
+from urdfkin.dh.tree_parameters import (
+    as_csv,
+    as_mapping,
+    make_tree_parameters,
+    measure_printed_tree,
+    tree_document,
+)
+from urdfkin.dh.units import AngleUnit, LengthUnit
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
@@ -80,8 +91,8 @@ class DHRequest:
     @property
     def units(self) -> Units:
         return Units(
-            Angles.DEGREES if self.degrees else Angles.RADIANS,
-            Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
+            AngleUnit.DEGREES if self.degrees else AngleUnit.RADIANS,
+            LengthUnit.MILLIMETRES if self.millimetres else LengthUnit.METRES,
             self.digits,
             self.columns,
         )
@@ -165,13 +176,13 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
     yield check_of_path(check)[0]
     if request.format_ in _ROUNDED:
-        yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")
+        yield from str(measure_printed_table(table, request.units, _ROUNDED[request.format_])).split("\n")
     if request.unchanged is None and (
         hint := snap_hint(table, lambda snap: _make_table(request, table.tip_frame, snap))
     ):
         yield f"hint: {hint}"
     if request.like is None and request.format_ in _PRINTED:
-        yield from (f"hint: {line}" for line in published(request.robot.origin.source))
+        yield from (f"hint: {line}" for line in suggest_published_tables(request.robot.origin.source))
 
 
 # -- the whole tree ------------------------------------------------------------------------------------
@@ -180,7 +191,7 @@ def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -
 def _write_tree(request: DHRequest) -> Answer:
     robot, format_ = request.robot, request.format_
     _require_format(request, "--tree", (*_TEXTS, "csv", "json"))
-    parameters = tree_parameters(robot.tree)
+    parameters = make_tree_parameters(robot.tree)
     if format_ == "json":
         text = json.dumps(as_mapping(parameters), indent=2, allow_nan=False) + "\n"
     elif format_ == "csv":
@@ -191,7 +202,7 @@ def _write_tree(request: DHRequest) -> Answer:
     check_line = str(check or check_of_path(None)[0])
     if format_ in _PRINTED:
         q = draw(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
-        text += f"\n{check_line}\n{printed_tree(parameters, request.units, q)}\n"
+        text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)
     return _answer(request, text, 0 if check is not None else 3)
@@ -209,18 +220,18 @@ def _compare(request: DHRequest, name: str) -> Answer:
     chain, tolerance = request.robot.chain(tip, base), request.tolerance / 1e3
     notes: list[str] = []
     if "convention" not in data:
-        convention = convention_that_fits(chain, data, tolerance, str(path))
+        convention = find_dh_convention(chain, data, tolerance, str(path))
         data = {**data, "convention": convention}
         notes = [
             f"The table names no convention; {convention} fits best. Write the convention into the table."
         ]
     try:
-        reference = table_of(data, str(path))
+        reference = parse_table_data(data, str(path))
     except InputError as error:
-        if mistake := diagnose(chain, data, tolerance):
+        if mistake := find_better_interpretation(chain, data, tolerance):
             error.remedy = f"{error.remedy}; {mistake}" if error.remedy else str(mistake)
         raise
-    found = compare(chain, reference, tolerance, fit=request.fit, digits=last_digits(data))
+    found = compare(chain, reference, tolerance, fit=request.fit, half_digits=half_digits_by_row(data))
     mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
         text = json.dumps(_comparison(found, reference, mistake), indent=2, allow_nan=False) + "\n"
@@ -238,12 +249,13 @@ def _better_interpretation(
     if found.agrees or found.mistakes:
         return None
     metres = found.metres
-    if not found.fitted:
-        # `diagnose` fits every interpretation, so the interpretation of the file is fitted too.
+    if not found.is_fitted:
+        # `find_better_interpretation` fits every interpretation, so the interpretation of the file is fitted
+        # too.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None
-    return diagnose(chain, data, found.tolerance, metres)
+    return find_better_interpretation(chain, data, found.tolerance, metres)
 
 
 def _frame_of_robot(request: DHRequest, name: object) -> str | None:
@@ -260,10 +272,10 @@ def _comparison(
         "read_as": str(reference.convention),
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
-        "proven_tip_off_at_most_m": found.most_metres,
-        "proven_tip_turned_at_most_rad": found.most_radians,
-        "as_written_tip_off_at_most_m": found.written_metres,
-        "as_written_tip_turned_at_most_rad": found.written_radians,
+        "proven_tip_off_at_most_m": found.metres_bound,
+        "proven_tip_turned_at_most_rad": found.radians_bound,
+        "as_written_tip_off_at_most_m": found.unfitted_metres,
+        "as_written_tip_turned_at_most_rad": found.unfitted_radians,
         "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},
         "tool_took_up": {"metres": found.tool.metres, "radians": found.tool.radians},
         "residual_m": found.residual,
@@ -274,7 +286,7 @@ def _comparison(
         "differences": [_difference(one) for one in found.differences],
         "likely_mistakes": [_mistake(one) for one in found.mistakes],
         "would_fit_read_as": mistake and mistake.as_mapping(),
-        "without_fitting": [_difference(one) for one in found.instead],
+        "without_fitting": [_difference(one) for one in found.unfitted_differences],
         "fitted": to_mapping(found.reference),
     }
 
@@ -286,7 +298,7 @@ def _difference(one: CellDifference) -> dict[str, Any]:
         "cell": one.cell,
         "table": one.reference,
         "urdf": one.urdf,
-        "tip_m": one.tip,
+        "tip_m": one.tip_displacement,
         "within_last_digit": one.is_rounding,
     }
 
@@ -296,7 +308,7 @@ def _mistake(one: Mistake) -> dict[str, Any]:
         "kind": str(one.kind),
         "rows": [row + 1 for row in one.rows],
         "cell": one.cell and _difference(one.cell),
-        "still_fitted": asdict(one.fitted),
+        "still_fitted": asdict(one.fit_changes),
         "tip_off_at_most_m": one.metres,
         "tip_turned_at_most_rad": one.radians,
     }

@@ -179,7 +179,7 @@ def structure_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.structure import opw_of, structure
+    from urdfkin.dh.structure import find_opw, find_structure
     from urdfkin.system.documents import plain
     from urdfkin.verify.conversions import check_opw, check_screws
 
@@ -189,11 +189,11 @@ def structure_command(
     if opw is None:
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
-        found = structure(screws)
+        found = find_structure(screws)
         data = {"json": lambda: plain(found)}
         return Answer(lambda: _structure_document(found), data, *check_of_path(check))
     path = loaded.chain(tip, base)
-    parameters = opw_of(path, opw / 1e3)
+    parameters = find_opw(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
     yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
     return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
@@ -218,7 +218,7 @@ def _structure_document(found: Structure) -> TextDocument:
     start = "measured from the point on the first axis that is nearest to the second axis"
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{bound}, {start}",
+        f"reach: {found.sampled_reach:.4g} m on samples{bound}, {start}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry
-from urdfkin.dh.units import fraction_text, pi_fraction
+from urdfkin.dh.units import format_pi_fraction, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
 from urdfkin.export.proof import Proof, compare
@@ -216,7 +216,7 @@ def _evaluated(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
 def literal(x: Number) -> str:
     """Return a constant as code for SymPy: `2`, `Rational(17, 40)`, `pi/2`."""
     if isinstance(x, PiMultiple):
-        text = fraction_text(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
+        text = format_pi_fraction(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
         return text if x.factor > 0 else f"(-{text})"
     x = Fraction(x)
     return str(x) if x.denominator == 1 else f"Rational({x.numerator}, {x.denominator})"

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from urdfkin.dh.convert import link_names
-from urdfkin.dh.export.text import document
+from urdfkin.dh.export.text import table_document
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
@@ -54,7 +54,7 @@ def code_of_chain(
 ) -> FrameCode:
     """Return the code for the last frame of a chain. The chain's base is the world frame."""
     if isinstance(chain, DHTable):
-        text, chain = document(chain, Units()).text(), _with_safe_names(chain)
+        text, chain = table_document(chain, Units()).text(), _with_safe_names(chain)
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from urdfkin.dh.export.code import plain
+from urdfkin.dh.export.code import sanitize
 
 #: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix.
 _LONGEST = 40
@@ -66,4 +66,4 @@ def comment_text(text: str) -> str:
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'
     """
-    return plain(text).replace("?", "_")
+    return sanitize(text).replace("?", "_")

@@ -1464,7 +1464,7 @@ class Robot(Displayable):
 
         The table's methods take only the coordinates of the joints in the table, in the order of
         `table.joint_names`. `robot.select(table, q)` selects these coordinates from q.
-        `urdfkin.dh.dh_table` explains the arguments in full.
+        `urdfkin.dh.make_dh_table` explains the arguments in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1505,14 +1505,14 @@ class Robot(Displayable):
             0.10915
         """
         with importing:
-            from urdfkin.dh.make import dh_table
+            from urdfkin.dh.make import make_dh_table
             from urdfkin.dh.table import DHTable
 
         if not isinstance(like, DHTable | None):
             raise InputError(
                 "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
             )
-        table = dh_table(
+        table = make_dh_table(
             self.tree,
             as_choice(tip, self.tip_frame, "tip"),
             as_choice(base, self.base_frame, "base"),
@@ -1552,10 +1552,10 @@ class Robot(Displayable):
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
         with importing:
-            from urdfkin.dh.screws import screws_of
+            from urdfkin.dh.screws import make_screws
             from urdfkin.verify.conversions import check_screws
 
-        found = screws_of(self.chain(tip, base))
+        found = make_screws(self.chain(tip, base))
         if self.verifier.policy_of_call(verify):
             check_screws(self.verifier, found)
         return found
@@ -1575,9 +1575,9 @@ class Robot(Displayable):
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
         with importing:
-            from urdfkin.dh.tree_parameters import tree_parameters
+            from urdfkin.dh.tree_parameters import make_tree_parameters
 
-        parameters = tree_parameters(self.tree)
+        parameters = make_tree_parameters(self.tree)
         if self.verifier.policy_of_call(verify):
             self.verifier.tree_parameters(parameters)
         return parameters
