@@ -30,7 +30,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors.escape import csv_cell, from_csv_cell, markdown_code, markdown_text
 from urdfkin.errors.escape import latex_text as escaped
 from urdfkin.export import write as code_text
-from urdfkin.export.forms import code_of_chain
+from urdfkin.export.forms import make_chain_code
 from urdfkin.report.compare import compare, markdown_of
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
@@ -197,7 +197,7 @@ def test_a_name_in_latex_has_no_active_character(kind: str) -> None:
 @pytest.mark.parametrize("kind", NAMES)
 def test_code_with_a_proof_is_the_same_with_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
-        written = code_of_chain(table(name), ["placement"], name="chain", verify=False)
+        written = make_chain_code(table(name), ["placement"], name="chain", verify=False)
         words = written.identifiers["q"]
         assert all(re.fullmatch(r"\w+", word, re.ASCII) for word in words)
         found = []

@@ -107,18 +107,18 @@ def export_command(
         )
         context.exit(_check(file))
     from urdfkin.export import code_in, write
-    from urdfkin.export.forms import code_of_robot
+    from urdfkin.export.forms import make_robot_code
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
-    code = code_in(code_of_robot(loaded, frame, names, reference, form, name=name, verify=verify), to)
+    code = code_in(make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to)
     write_output(write(code, to), output)
     proof = code.proof
     say(check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:
-        say(f"The expressions were evaluated {proof.evaluated}. {proof.constants}", err=True)
+        say(f"The expressions were evaluated {proof.precision_text}. {proof.constants}", err=True)
     context.exit(exit_code(proof.certificate))
 
 
@@ -128,9 +128,9 @@ def _check(file: Path) -> int:
     found = check(file)
     for line in found.lines:
         say(line)
-    if not found.good:
+    if not found.passed:
         return 1
-    for reason in found.doubts:
+    for reason in found.warnings:
         say(f"UNVERIFIED: {reason}", err=True)
     return 0 if found.verified else 3
 

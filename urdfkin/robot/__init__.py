@@ -1397,9 +1397,9 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.export.python import need_torch, torch_module
+            from urdfkin.export.python import require_torch, torch_module
 
-        need_torch()
+        require_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
