@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.cli.output import Answer, check_of_path
+from urdfkin.cli.output import Answer, format_path_check
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
@@ -98,7 +98,7 @@ class DHRequest:
         )
 
 
-def run(request: DHRequest) -> Answer:
+def make_dh_answer(request: DHRequest) -> Answer:
     modes = {"--all": request.all_, "--tree": request.tree, "--compare": request.compare}
     chosen = [name for name, value in modes.items() if value]
     if len(chosen) > 1:
@@ -130,16 +130,18 @@ def _write_tables(request: DHRequest) -> Answer:
     checks = [verifier.table(table) if verifier.policy else None for table in tables]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
-        documents = [{**to_mapping(table), "checked": check_of_path(check)[0]} for table, check in results]
+        documents = [
+            {**to_mapping(table), "checked": format_path_check(check)[0]} for table, check in results
+        ]
         text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(request, table, check) for table, check in results)
     if format_ not in (*_PRINTED, "json"):
         for table, check in results:
-            for line in _lines_below(request, table, check):
+            for line in _lines_below_table(request, table, check):
                 say(line, err=True)
     code = 0 if all(check is not None and check.within for check in checks) else 3
-    return _answer(request, text, code)
+    return _make_answer(request, text, code)
 
 
 def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
@@ -169,12 +171,12 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
         return drawing(table)
     text = export(table, request.format_, request.units, verify=bool(request.robot.verifier.policy))
     if request.format_ in _PRINTED:
-        return "\n".join([text, *_lines_below(request, table, check), ""])
+        return "\n".join([text, *_lines_below_table(request, table, check), ""])
     return text
 
 
-def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    yield check_of_path(check)[0]
+def _lines_below_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
+    yield format_path_check(check)[0]
     if request.format_ in _ROUNDED:
         yield from str(measure_printed_table(table, request.units, _ROUNDED[request.format_])).split("\n")
     if request.unchanged is None and (
@@ -199,13 +201,13 @@ def _write_tree(request: DHRequest) -> Answer:
     else:
         text = tree_document(parameters, request.units).written(format_)
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
-    check_line = str(check or check_of_path(None)[0])
+    check_line = str(check or format_path_check(None)[0])
     if format_ in _PRINTED:
         q = draw(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)
-    return _answer(request, text, 0 if check is not None else 3)
+    return _make_answer(request, text, 0 if check is not None else 3)
 
 
 # -- a comparison --------------------------------------------------------------------------------------
@@ -234,13 +236,13 @@ def _compare(request: DHRequest, name: str) -> Answer:
     found = compare(chain, reference, tolerance, fit=request.fit, half_digits=half_digits_by_row(data))
     mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
-        text = json.dumps(_comparison(found, reference, mistake), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(_comparison_data(found, reference, mistake), indent=2, allow_nan=False) + "\n"
     else:
         document = comparison_document(found, request.units)
         hints = ["", f"hint: {mistake}"] if mistake else []
         parts = [*notes, Strong(document.title), *document.parts, *hints]
         text = TextDocument("", parts).written(request.format_)
-    return _answer(request, text, 0 if found.passes else 1)
+    return _make_answer(request, text, 0 if found.passes else 1)
 
 
 def _better_interpretation(
@@ -262,7 +264,7 @@ def _frame_of_robot(request: DHRequest, name: object) -> str | None:
     return name if isinstance(name, str) and name in request.robot.frame_names else None
 
 
-def _comparison(
+def _comparison_data(
     found: TableComparison, reference: DHTable, mistake: BetterInterpretation | None
 ) -> dict[str, Any]:
     return {
@@ -283,15 +285,15 @@ def _comparison(
         "senses": list(found.senses),
         "offsets": list(found.offsets),
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
-        "differences": [_difference(one) for one in found.differences],
-        "likely_mistakes": [_mistake(one) for one in found.mistakes],
+        "differences": [_difference_data(one) for one in found.differences],
+        "likely_mistakes": [_mistake_data(one) for one in found.mistakes],
         "would_fit_read_as": mistake and mistake.as_mapping(),
-        "without_fitting": [_difference(one) for one in found.unfitted_differences],
+        "without_fitting": [_difference_data(one) for one in found.unfitted_differences],
         "fitted": to_mapping(found.reference),
     }
 
 
-def _difference(one: CellDifference) -> dict[str, Any]:
+def _difference_data(one: CellDifference) -> dict[str, Any]:
     return {
         "row": one.row + 1,
         "joint": one.joint,
@@ -303,16 +305,16 @@ def _difference(one: CellDifference) -> dict[str, Any]:
     }
 
 
-def _mistake(one: Mistake) -> dict[str, Any]:
+def _mistake_data(one: Mistake) -> dict[str, Any]:
     return {
         "kind": str(one.kind),
         "rows": [row + 1 for row in one.rows],
-        "cell": one.cell and _difference(one.cell),
+        "cell": one.cell and _difference_data(one.cell),
         "still_fitted": asdict(one.fit_changes),
         "tip_off_at_most_m": one.metres,
         "tip_turned_at_most_rad": one.radians,
     }
 
 
-def _answer(request: DHRequest, text: str, code: int) -> Answer:
+def _make_answer(request: DHRequest, text: str, code: int) -> Answer:
     return Answer(lambda: TextDocument(""), {request.format_: lambda: text}, code=code)

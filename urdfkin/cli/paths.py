@@ -13,8 +13,8 @@ import click
 from urdfkin.cli.options import (
     FiniteNumber,
     convention_of_input_option,
-    conversion_of,
     digits_option,
+    find_conversion,
     load_robot,
     path_options,
     q_option,
@@ -24,7 +24,7 @@ from urdfkin.cli.options import (
     seed_option,
     verify_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, check_of_path, writes_answer
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, format_path_check
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @convention_of_input_option
 @seed_option
 @verify_option
-@writes_answer()
+@answer_command()
 def chain_command(
     robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
 ) -> Answer:
@@ -59,7 +59,7 @@ def chain_command(
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
-    inputs = read_inputs(loaded, path.tip, seed, q, conversion=conversion_of(loaded, convention))
+    inputs = read_inputs(loaded, path.tip, seed, q, conversion=find_conversion(loaded, convention))
     if len(inputs.q) != 1:
         raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(inputs.q)))
     path_q = path.coupling.select(loaded.tree, inputs.q)[0]
@@ -76,7 +76,7 @@ def chain_command(
         return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
 
     def data() -> dict[str, Any]:
-        converted = inputs.converted()
+        converted = inputs.convert_inputs()
         return {
             "robot": loaded.name,
             "source": loaded.source,
@@ -108,7 +108,7 @@ def chain_command(
             yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
 
     check = check_chain(loaded.verifier, path, inputs.q) if verify else None
-    return Answer(document, {"json": data, "csv": rows}, *check_of_path(check))
+    return Answer(document, {"json": data, "csv": rows}, *format_path_check(check))
 
 
 def _kind_of_joint(joint: Any) -> str:
@@ -132,7 +132,7 @@ _SUFFIXES = {
 @path_options
 @digits_option
 @verify_option
-@writes_answer(*SCREW_FORMATS, suffixes=_SUFFIXES)
+@answer_command(*SCREW_FORMATS, suffixes=_SUFFIXES)
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
@@ -153,7 +153,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     check = check_screws(loaded.verifier, screws) if verify else None
     exact = (form for form in SCREW_FORMATS if form not in ("terminal", "markdown", "html"))
     data = {form: partial(write_screws, screws, form, digits) for form in exact}
-    return Answer(partial(screws_document, screws, digits), data, *check_of_path(check))
+    return Answer(partial(screws_document, screws, digits), data, *format_path_check(check))
 
 
 @click.command("structure", epilog="Example: urdfkin structure ur5 --tip tool0")
@@ -167,7 +167,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     " error of the tip pose exceeds MM millimetres or MM milliradians.",
 )
 @verify_option
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
@@ -191,12 +191,12 @@ def structure_command(
         check = check_screws(loaded.verifier, screws) if verify else None
         found = find_structure(screws)
         data = {"json": lambda: plain(found)}
-        return Answer(lambda: _structure_document(found), data, *check_of_path(check))
+        return Answer(lambda: _structure_document(found), data, *format_path_check(check))
     path = loaded.chain(tip, base)
     parameters = find_opw(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
     yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
-    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
+    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *format_path_check(check))
 
 
 def _structure_document(found: Structure) -> TextDocument:
