@@ -277,8 +277,8 @@ def test_all_output_of_the_command_line_passes_the_safe_stream() -> None:
     allowed = {
         "streams.py": ("click.echo(printable(line)",),
         "explain.py": (
-            "click.echo(equation)", "click.echo(format_answer(", "click.echo(explain(", 'click.echo(f"{rule.id}',
-            'click.echo(f"questions: ',
+            "click.echo(equation)", "click.echo(format_answer(", "click.echo(explain(",
+            'click.echo(f"{rule.id}', 'click.echo(f"questions: ',
         ),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "options.py": ("click.echo(getattr(importlib.import_module(module), name).schema_text()",),
