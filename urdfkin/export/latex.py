@@ -67,15 +67,15 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
     for head, lines in writer.statements():
         step, _, equations = head.partition(": ")
         yield rf"{latex_text(step)}{f' ({equations})' if equations else ''}:"
-        yield from _aligned(lines)
+        yield from _align_lines(lines)
     letter = _RESULTS[function.name]
-    yield from _aligned(
+    yield from _align_lines(
         (f"{letter}_{{{','.join(str(i + 1) for i in indices)}}}", value)
         for indices, value in zip(np.ndindex(function.shape), writer.results(), strict=True)
     )
 
 
-def _aligned(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
+def _align_lines(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
     yield r"\begin{align*}"
     yield " \\\\\n".join(f"{symbol} &= {_formula(value)}" for symbol, value in lines)
     yield r"\end{align*}"
