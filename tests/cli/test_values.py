@@ -14,7 +14,7 @@ from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
 from urdfkin.dh import read_table
-from urdfkin.dh.parse_table import references
+from urdfkin.dh.parse_table import published_tables
 from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
@@ -248,7 +248,7 @@ def test_unusual_robots_are_processed_in_every_format(quantity: str, name: str) 
 
 def test_a_table_can_be_used_as_a_robot_and_an_absent_check_has_a_reason() -> None:
     assert "the check was turned off by verify=False" in urdfkin("jacobian panda --no-verify").text
-    path, q = str(references()["ur5"]), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    path, q = str(published_tables()["ur5"]), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     robot = library.load(read_table(path))
     done = good("jacobian", path, "--q", ",".join(map(str, q)), "--format", "json")
     assert done.data["result"] == [robot.jacobian(q, robot.tip_frame).tolist()]

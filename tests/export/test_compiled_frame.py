@@ -14,8 +14,8 @@ from tests.laws.subjects import state
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import c, compiled_frame
-from urdfkin.export.code import exported
-from urdfkin.export.compiled_frame import NoCompilerError, library
+from urdfkin.export.code import exportable_quantities
+from urdfkin.export.compiled_frame import NoCompilerError, load_library
 from urdfkin.model.tree import freeze
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import VerificationError
@@ -32,7 +32,7 @@ def test_compiled_results_agree_with_pinocchio_and_are_equal_in_single_calls_and
     robot = urdfkin.load("panda" if name == "panda" else urdf_of(name))
     fast = robot.compile(robot.tip_frame, "local_world_aligned")
     inputs = state(robot, 37, 5)
-    asked = exported() if name == "panda" else [quantity("jacobian"), quantity("acceleration")]
+    asked = exportable_quantities() if name == "panda" else [quantity("jacobian"), quantity("acceleration")]
     for row in asked:
         given = inputs[: len(row.inputs)]
         found = getattr(fast, row.method)(*given)
@@ -166,7 +166,7 @@ def test_without_a_compiler_a_compiled_frame_returns_the_results_of_the_robot(
     def none(code: object) -> object:
         raise NoCompilerError("cc is not installed")
 
-    monkeypatch.setattr(compiled_frame, "library", none)
+    monkeypatch.setattr(compiled_frame, "load_library", none)
     robot = urdfkin.load("planar_two_link", verify=False)
     fast, q = robot.compile(robot.tip_frame), np.array([0.3, -0.4])
     assert fast.jacobian(q).tobytes() == robot.jacobian(q, robot.tip_frame).tobytes()
@@ -178,11 +178,11 @@ def test_without_a_compiler_a_compiled_frame_returns_the_results_of_the_robot(
 def test_machine_code_with_wrong_results_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def wrong(code: Any) -> object:
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        literal = c.literal
-        monkeypatch.setattr(c, "literal", lambda x: literal(x * (1.0 + 1e-12)))
-        return library(code)
+        format_literal = c.format_literal
+        monkeypatch.setattr(c, "format_literal", lambda x: format_literal(x * (1.0 + 1e-12)))
+        return load_library(code)
 
-    monkeypatch.setattr(compiled_frame, "library", wrong)
+    monkeypatch.setattr(compiled_frame, "load_library", wrong)
     robot = urdfkin.load("planar_two_link")
     with pytest.raises(VerificationError, match="jacobian"):
         robot.compile(robot.tip_frame).jacobian([0.3, -0.4])

@@ -56,7 +56,7 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 
 
 def format_from_suffix(
-    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], without_suffix: str
+    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], default_format: str
 ) -> str:
     """Return the output format; raise InputError if --format contradicts the suffix of the output file.
 
@@ -65,7 +65,7 @@ def format_from_suffix(
     format_: str = context.params["format_"]
     if output is None:
         return format_
-    chosen = is_given(context, "format_")
+    chosen = is_on_command_line(context, "format_")
     suffix = output.suffix.lower()
     if suffix not in formats:
         if not chosen and suffix:
@@ -74,7 +74,7 @@ def format_from_suffix(
                 where=shorten_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
-        return format_ if chosen else without_suffix
+        return format_ if chosen else default_format
     if not chosen:
         return formats[suffix][0]
     if format_ not in formats[suffix]:
@@ -86,14 +86,14 @@ def format_from_suffix(
     return format_
 
 
-def is_given(context: click.Context, name: str) -> bool:
+def is_on_command_line(context: click.Context, name: str) -> bool:
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
     """Raise InputError, such as "--format does nothing with --opw", for an option without effect."""
     for parameter in context.command.params:
-        if parameter.name in unused and is_given(context, parameter.name):
+        if parameter.name in unused and is_on_command_line(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
             raise InputError(f"{name} does nothing {because}", remedy="leave out this option")
 
@@ -130,7 +130,9 @@ def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bo
     return store
 
 
-def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
+def _make_pair_reader(
+    separator: str, form: str, *, needs_value: bool
+) -> Callable[[Sequence[str]], dict[str, str]]:
     def read(words: Sequence[str]) -> dict[str, str]:
         pairs = {}
         for word in words:
@@ -153,7 +155,9 @@ source_options = combine(
         multiple=True,
         metavar="NAME:=VALUE",
         expose_value=False,
-        callback=_store_as("xacro_args", _read_pairs(":=", "NAME:=VALUE", needs_value=False), always=True),
+        callback=_store_as(
+            "xacro_args", _make_pair_reader(":=", "NAME:=VALUE", needs_value=False), always=True
+        ),
         help="Argument of a .xacro file; repeatable. The file is expanded in a restricted process.",
     ),
     click.option(
@@ -161,7 +165,7 @@ source_options = combine(
         multiple=True,
         metavar="SET=NAME",
         expose_value=False,
-        callback=_store_as("variant", _read_pairs("=", "SET=NAME", needs_value=True)),
+        callback=_store_as("variant", _make_pair_reader("=", "SET=NAME", needs_value=True)),
         help="Select a variant of a USD file; repeatable.",
     ),
     click.option(
@@ -257,8 +261,10 @@ def oracle_option(help_: str = "Library that checks each result.") -> Callable[[
 seed_option = click.option("--seed", type=WholeNumber(0), default=0, help="Seed of the random values.")
 
 
-def samples_option(default: int, help_: str, least: int = 0, most: int | None = None) -> Callable[[_F], _F]:
-    return click.option("--samples", type=WholeNumber(least, most), default=default, help=help_)
+def samples_option(
+    default: int, help_: str, minimum: int = 0, maximum: int | None = None
+) -> Callable[[_F], _F]:
+    return click.option("--samples", type=WholeNumber(minimum, maximum), default=default, help=help_)
 
 
 def _values_option(name: str, help_: str) -> Callable[[_F], _F]:
@@ -310,7 +316,7 @@ def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
     return click.option("--schema", is_flag=True, expose_value=False, callback=show, help=help_)
 
 
-def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
+def find_conversion(robot: Robot, name: str | None) -> Conversion | None:
     return None if name is None else robot.convention(name)
 
 
@@ -335,7 +341,7 @@ def warn_of_limits(robot: Robot, q: FloatArray) -> None:
         say(f"warning: {line}", err=True)
 
 
-def locked_joints(robot: Robot) -> dict[str, Any]:
+def lock_settings(robot: Robot) -> dict[str, Any]:
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -379,7 +385,7 @@ class Inputs:
     def velocity_names(self) -> tuple[str, ...]:
         return (self.conversion or self.robot).velocity_names
 
-    def converted(self) -> Inputs:
+    def convert_inputs(self) -> Inputs:
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
@@ -402,7 +408,7 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
     return robot
 
 
-def load_several(*sources: str) -> tuple[Robot, ...]:
+def load_robots(*sources: str) -> tuple[Robot, ...]:
     from urdfkin.urdf.sources import is_usd, is_xacro
 
     if sources.count("-") > 1:
@@ -446,7 +452,7 @@ def read_inputs(
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     warn_of_limits(robot, q_)
-    settings = locked_joints(robot)
+    settings = lock_settings(robot)
     return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, settings=settings, conversion=conversion)
 
 

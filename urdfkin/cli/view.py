@@ -14,7 +14,7 @@ from urdfkin.cli.options import (
     FiniteNumber,
     WholeNumber,
     convention_of_input_option,
-    conversion_of,
+    find_conversion,
     frame_option,
     load_robot,
     q_option,
@@ -82,7 +82,7 @@ def view_command(
     from urdfkin.view.viewer import Viewer
 
     loaded = load_robot(robot)
-    conversion = conversion_of(loaded, convention)
+    conversion = find_conversion(loaded, convention)
     start = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
     if start is not None and len(start) != 1:
         raise InputError(
@@ -150,7 +150,7 @@ PANELS = (
     default=1.0,
     help="With --to: duration of the motion in seconds.",
 )
-@samples_option(201, "With --to: number of samples along the line.", least=3)
+@samples_option(201, "With --to: number of samples along the line.", minimum=3)
 @seed_option
 @click.option(
     "--panel",
@@ -217,7 +217,7 @@ def _line(
 ) -> Trajectory:
     from urdfkin.robot.trajectory import make_line_trajectory
 
-    conversion = conversion_of(robot, convention)
+    conversion = find_conversion(robot, convention)
     first, last = (
         read_inputs(robot, None, seed, text, option=option, conversion=conversion).q
         for option, text in (("--from", start), ("--to", end))

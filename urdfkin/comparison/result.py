@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import nearest_twelfth
-from urdfkin.dh.units import units_of
+from urdfkin.dh.units import parse_units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
@@ -666,7 +666,7 @@ def changes_of_b(
             offset = _remove_rounding(step.offset, least)
             twelfth = nearest_twelfth(offset)
             if step.kind == "turns" and abs(offset - twelfth) <= 2.0 * least:
-                size = units_of().angle(abs(twelfth))
+                size = parse_units().format_angle(abs(twelfth))
             else:
                 size = repr(abs(offset))
             constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""

@@ -1394,9 +1394,9 @@ class Robot(Displayable):
         True
         """
         with import_lock:
-            from urdfkin.export.python import need_torch, torch_module
+            from urdfkin.export.python import require_torch, torch_module
 
-        need_torch()
+        require_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
@@ -1461,7 +1461,7 @@ class Robot(Displayable):
 
         The table's methods take only the coordinates of the joints in the table, in the order of
         `table.joint_names`. `robot.select(table, q)` selects these coordinates from q.
-        `urdfkin.dh.dh_table` explains the arguments in full.
+        `urdfkin.dh.make_dh_table` explains the arguments in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1502,14 +1502,14 @@ class Robot(Displayable):
             0.10915
         """
         with import_lock:
-            from urdfkin.dh.make import dh_table
+            from urdfkin.dh.make import make_dh_table
             from urdfkin.dh.table import DHTable
 
         if not isinstance(like, DHTable | None):
             raise InputError(
                 "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
             )
-        table = dh_table(
+        table = make_dh_table(
             self.tree,
             as_choice(tip, self.tip_frame, "tip"),
             as_choice(base, self.base_frame, "base"),
@@ -1549,10 +1549,10 @@ class Robot(Displayable):
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
         with import_lock:
-            from urdfkin.dh.screws import screws_of
+            from urdfkin.dh.screws import make_screws
             from urdfkin.verify.conversions import check_screws
 
-        found = screws_of(self.chain(tip, base))
+        found = make_screws(self.chain(tip, base))
         if self.verifier.policy_of_call(verify):
             check_screws(self.verifier, found)
         return found
@@ -1572,9 +1572,9 @@ class Robot(Displayable):
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
         with import_lock:
-            from urdfkin.dh.tree_parameters import tree_parameters
+            from urdfkin.dh.tree_parameters import make_tree_parameters
 
-        parameters = tree_parameters(self.tree)
+        parameters = make_tree_parameters(self.tree)
         if self.verifier.policy_of_call(verify):
             self.verifier.tree_parameters(parameters)
         return parameters

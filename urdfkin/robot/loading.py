@@ -184,7 +184,7 @@ def _load_table(
     xacro_args: Mapping[str, object] | None,
     **options: Unpack[LoadOptions],
 ) -> Robot:
-    from urdfkin.dh.compare.hypotheses import table_warnings
+    from urdfkin.dh.compare.hypotheses import find_table_warnings
     from urdfkin.dh.convert import to_urdf
     from urdfkin.dh.parse_table import read_table_or_screws
     from urdfkin.dh.screws import ProductOfExponentials
@@ -202,7 +202,7 @@ def _load_table(
         urdf = write_urdf(table.to_tree())
     else:
         urdf = to_urdf(table)
-        for warning in table_warnings(table):
+        for warning in find_table_warnings(table):
             warnings.warn(f"{name}: {warning}", UrdfWarning, stacklevel=3)
     text = UrdfText(urdf.encode(), name, name)
     robot = make_robot(text, **options, is_generated=True, table=True)

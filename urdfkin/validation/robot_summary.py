@@ -17,7 +17,7 @@ from typing import Any, cast
 import numpy as np
 
 from urdfkin.dh import DHTable
-from urdfkin.dh.make import dh_table
+from urdfkin.dh.make import make_dh_table
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import RangeReduction, draw_samples, range_reductions
 from urdfkin.robot import Robot
@@ -99,7 +99,7 @@ def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
     found = []
     for limb, base, tip in _chains(robot):
         try:
-            tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
+            tables = {name: make_dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
             continue  # Denavit-Hartenberg tables contain no planar or floating joints.
         if any(table.rows for table in tables.values()):
