@@ -36,7 +36,7 @@ from urdfkin.dh.convert import link_names, to_tree
 from urdfkin.dh.export.code import plain
 from urdfkin.errors import InputError
 from urdfkin.export import LANGUAGES
-from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.configuration import coordinate_names, sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -205,7 +205,9 @@ class Subject:
         """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # A table without lengths still has rounding errors of its angles.
-        allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
+        allowed = 2.0 * np.maximum(
+            self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
+        )
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 
 

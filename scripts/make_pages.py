@@ -24,8 +24,8 @@ from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
-from urdfkin.kinematics.registry import table as equations
-from urdfkin.model.configuration import draw_base
+from urdfkin.kinematics.registry import equations_page
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
@@ -171,7 +171,7 @@ def study() -> dict[str, str]:
         for name, kind in STUDIED.items()
     }
     for name in MOVING:
-        base = draw_base(SAMPLES, np.random.default_rng([0, 1]))
+        base = draw_base_motion(SAMPLES, np.random.default_rng([0, 1]))
         studies[f"{name} on a moving base"] = accuracy_study(urdfkin.load(name), samples=SAMPLES, base=base)
     return study_parts(studies)
 
@@ -290,7 +290,7 @@ def path_of(name: str) -> Path:
 
 def page(name: str) -> str:
     if name == "equations":
-        return equations()
+        return equations_page()
     text = path_of(name).read_text("utf-8")
     if name == "performance":
         return tables.page(text, json.loads(FIGURES.read_text("utf-8")))

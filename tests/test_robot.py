@@ -41,7 +41,7 @@ def panda() -> Robot:
 @pytest.fixture
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make all bounds smaller than rounding errors, so that correct results raise VerificationError."""
-    monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
+    monkeypatch.setattr(roundings, "PINOCCHIO_ROUNDINGS", 1e-9)
 
 
 HAND = "panda_hand"

@@ -22,7 +22,7 @@ from urdfkin.dh.snapping import noisy_cells
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.urdf.xacro import find_arguments
@@ -158,7 +158,7 @@ def test_a_tilt_larger_than_rounding_gives_hayati_rows(tilt: float) -> None:
     table = dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
     q = np.random.default_rng(0).uniform(-3, 3, (50, 4))
-    assert np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max() <= 20 * EPS
+    assert np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max() <= 20 * EPS
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def _is_number(cell: str) -> bool:
 def test_the_table_states_the_computed_result_and_the_closeness_of_the_check(quantity: str) -> None:
     text = command(quantity, 1, "local_world_aligned", "table").text
     words = ["panda", "panda_hand", "verified by Pinocchio 4", "eps*scale"]
-    words += library.load("panda").rate_names if quantity.startswith("jacobian") else []
+    words += library.load("panda").velocity_names if quantity.startswith("jacobian") else []
     assert [word for word in words if word not in text] == []
 
 
@@ -88,7 +88,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(line: str, colu
     line += " talos --frame gripper_left_base_link --q random:1"
     *lines, _ = urdfkin(line).text.splitlines()  # the last line states the check
     assert max(map(len, lines[2:])) <= columns  # the terminal wraps the text above the table
-    path = [name for name in library.load("talos").rate_names if name.startswith(("torso", "arm_left"))]
+    path = [name for name in library.load("talos").velocity_names if name.startswith(("torso", "arm_left"))]
     assert len(path) == 9
     assert set(path) <= {line.split()[0] for line in lines if line.split()}
     if line.startswith("jacobian"):
@@ -140,7 +140,7 @@ def test_the_json_result_contains_robot_frame_names_inputs_and_check() -> None:
     data = urdfkin("acceleration panda --q random --v random --a random --format json").data
     assert (data["robot"], data["frame"]) == ("panda", "panda_hand_tcp")
     assert data["reference"] == "local_world_aligned"
-    assert (data["coordinates"], data["rates"]) == (list(robot.coordinate_names), list(robot.rate_names))
+    assert (data["coordinates"], data["rates"]) == (list(robot.coordinate_names), list(robot.velocity_names))
     assert len(data["q"]) == len(data["v"]) == len(data["a"]) == len(data["result"]) == 1
     assert data["verified"] is True
     assert data["check"].startswith("verified by Pinocchio 4")
@@ -351,7 +351,7 @@ def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     robot = library.load("panda", lock={"panda_finger_joint1": 0.04})
     assert done.code == 0, done.err
     assert done.data["result"] == [robot.jacobian("ready").tolist()]
-    assert done.data["rates"] == list(robot.rate_names)
+    assert done.data["rates"] == list(robot.velocity_names)
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
     found = urdfkin("placement panda", *words, "--q", "0.1,0.2", "--format", "json").data

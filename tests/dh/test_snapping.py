@@ -18,8 +18,8 @@ from urdfkin.dh.export.text import printed
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.dh.units import Units
-from urdfkin.model.chain import chain
-from urdfkin.model.configuration import WIDEST
+from urdfkin.model.chain import make_chain
+from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree
 
 
@@ -38,7 +38,7 @@ def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) 
 
 def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest position error and orientation error of the tip."""
-    exact, found = chain(tree, "tip").placement(q), table.placement(q)
+    exact, found = make_chain(tree, "tip").placement(q), table.placement(q)
     metres = np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1)
     return metres, rotation_angle(found[..., :3, :3], exact[..., :3, :3])
 
@@ -65,11 +65,11 @@ def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
 ) -> None:
     table = dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
-    own = chain(tree, "tip").coupling.select(tree, q)
+    own = make_chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
     allowed_metres, allowed_radians = table.tolerance(own)
     # Offsets that cancel are in no cell, but their sum has rounding errors.
-    rounding = 20 * EPS * (1 + len(tree.joints)) * chain(tree, "tip").lengths.sum()
+    rounding = 20 * EPS * (1 + len(tree.joints)) * make_chain(tree, "tip").lengths.sum()
     assert (metres <= allowed_metres + rounding).all()
     assert (radians <= allowed_radians).all()
 
@@ -152,8 +152,8 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
 @pytest.mark.parametrize(
     ("limit", "travel"),
     [
-        (None, WIDEST),
-        (Limit(-math.inf, 3.0, 1.0, 1.0), WIDEST),
+        (None, ASSUMED_LIMIT),
+        (Limit(-math.inf, 3.0, 1.0, 1.0), ASSUMED_LIMIT),
         (Limit(-0.5, 3.0, 1.0, 1.0), 3.0),
         (Limit(-4.0, 3.0, 1.0, 1.0), 4.0),
     ],
@@ -172,7 +172,7 @@ def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without
         export(dh_table(sliding(limit), "tip", snap=10 * OFF), form)
         for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
     )
-    condition = f"joints without limits travel at most {WIDEST:g} m"
+    condition = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
     assert condition in " ".join(endless.split())
     assert condition not in " ".join(limited.split())
 
@@ -182,7 +182,7 @@ def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_withou
         printed(dh_table(sliding(limit, 0.1), "tip"), Units(digits=3))
         for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
     )
-    assert str(endless).endswith(f"m; this holds if joints without limits travel at most {WIDEST:g} m")
+    assert str(endless).endswith(f"m; this holds if joints without limits travel at most {ASSUMED_LIMIT:g} m")
     assert "travel" not in str(limited)
     assert limited.metres < endless.metres <= present(endless.bound)
 
@@ -235,7 +235,7 @@ def test_the_row_of_a_constant_depends_on_the_convention(convention: str, row: i
 
 @pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
 def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, sliders: str) -> None:
-    path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
+    path = make_chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
     found = _change(path, pivot, "something", OFF)
     assert found.sliders == tuple(sliders.split())
     assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])

@@ -19,7 +19,7 @@ from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import screws_of
 from urdfkin.dh.structure import Structure, opw_of, structure
 from urdfkin.errors import InputError
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -33,7 +33,7 @@ PUMA: list[list[float]] = [
 
 
 def of_tree(tree: KinematicTree) -> Structure:
-    return structure(screws_of(chain(tree, "tip")))
+    return structure(screws_of(make_chain(tree, "tip")))
 
 
 def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:

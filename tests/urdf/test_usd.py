@@ -26,10 +26,15 @@ from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness, SameQuestion, Verdict
 from urdfkin.errors import InputError, OracleError, SourceError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
-from urdfkin.model.conventions.convention import transcoded
-from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
+from urdfkin.kinematics.rotation import (
+    quaternion_of,
+    rotation_about,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
+from urdfkin.model.conventions.convention import transcode
+from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
 from urdfkin.verify import usd_check
@@ -112,6 +117,15 @@ def findings(robot: urdfkin.Robot) -> list[str]:
 def reach(robot: urdfkin.Robot) -> float:
     """Return the x coordinate of the link `lower` at q = 0."""
     return float(robot.placement([0.0, 0.0], "lower")[0, 3])
+
+
+def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_the_other(read: Read) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, "inf"), localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == (-1.0, 1000.0)
+    what = "a prismatic joint without an upper limit gets +1000 m, because URDF requires limits"
+    assert findings(robot) == [f"USD102 /arm/rail: {what}"]
 
 
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
@@ -482,6 +496,10 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "a joint outside the articulation": (
         ARM + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), ["USD101 /arm/closing"],
     ),
+    "a distance joint": (
+        ARM + joint("rope", "Distance", "upper", "lower"),
+        ["USD101 /arm/rope: a tree cannot represent this DistanceJoint"],
+    ),
     "a disabled joint": (
         ARM + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
         ["USD101 /arm/off"],
@@ -511,7 +529,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "an equality with more terms than the mimic rule": (equality(1), ["USD101 /arm/rail"]),
     "a joint with a schema that would be listed": (
         ARM + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
-        ["USD101 /arm/weld: a tree cannot represent this FixedJoint, which is outside the articulation"],
+        ["USD101 /arm/weld: this FixedJoint is excluded from the articulation"],
     ),
     "a PointInstancer of a shape": (
         ARM + CROWD % 'def Cube "one" {\n}\n',
@@ -882,7 +900,7 @@ def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
     placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
     for link, T in zip(tree.links, placements, strict=True):
         placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
-        prims.append(body(transcoded(link), "", placed, ROOT * (link == tree.links[0])))
+        prims.append(body(transcode(link), "", placed, ROOT * (link == tree.links[0])))
     joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
@@ -905,20 +923,20 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
-    ends = [transcoded(tree.links[one.parent]), transcoded(tree.links[k + 1])]
+    ends = [transcode(tree.links[one.parent]), transcode(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
     rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{transcoded(rule.leader)}")
+        words = FOLLOWS.format(f"joints/{transcode(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
-    if one.limit is not None and one.kind.bounded:
+    if one.limit is not None and one.kind.has_limits:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
-    return joint(transcoded(one.name), name, first, second, words, schema, limits=limits, **frames)
+    return joint(transcode(one.name), name, first, second, words, schema, limits=limits, **frames)
 
 
 _X = np.array([1.0, 0.0, 0.0])
@@ -1119,7 +1137,7 @@ def test_each_mistake_of_a_converter_is_detected_and_described(converted: Read, 
         said = [*found.up_to, *codes(wrong)]
         said += [one.words for one in (*found.differences, *found.remarks)]
         # If the limits are too large for radians, only `same` reports the mistake.
-        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE
+        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > MAX_PLAUSIBLE_ANGLE
         assert not found.up_to_single or kind == "radians", (kind, name)
         assert any((": limits " if wide else word) in one for one in said), (kind, name, said)
         if kind == "radians":
@@ -1258,7 +1276,7 @@ def test_the_newton_simulator_computes_the_same_placements(write: Write, up: str
             T = robot.placement(q, str(label).rpartition("/")[2])
             assert seven[:3] == pytest.approx(T[:3, 3], abs=1e-5)
             x, y, z, w = seven[3:].astype(float) / np.linalg.norm(seven[3:])
-            assert pose(rotation_of([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
+            assert pose(rotation_from_quaternion([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
 
 
 def turn(name: str, first: str, second: str, place: Sequence[float], rotation: object = (1, 0, 0, 0)) -> str:
@@ -1371,7 +1389,7 @@ def test_two_joints_of_a_stage_without_a_common_link_between_them_may_not_be_rou
 def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_rounding(
     read: Read, x: float, names: tuple[str, str]
 ) -> None:
-    hand, camera = map(transcoded, names)
+    hand, camera = map(transcode, names)
     urdf = urdfs.robot(
         urdfs.joint("first", "continuous", "base", "b", 'xyz="0 0 0.5"'),
         urdfs.joint("second", "continuous", "b", names[0], f'xyz="{x} 0 0.5"'),
@@ -1474,7 +1492,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         xyzw = rng.normal(size=4)
         xyzw /= np.linalg.norm(xyzw)
         w, v = float(xyzw[3]), xyzw[:3].tolist()
-        matrix = pose(rotation_of(xyzw)).T
+        matrix = pose(rotation_from_quaternion(xyzw)).T
         for op, exact, rounded in (
             (f"Rotate{orders[k % 6]}", gf.Vec3d(*degrees), gf.Vec3f(*degrees)),
             (f"Rotate{'XYZ'[k % 3]}", float(degrees[0]), float(np.float32(degrees[0]))),
@@ -1483,7 +1501,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         ):
             angle = _angle_between(placed(op, exact, "Double", k), placed(op, rounded, "Float", k))
             kind = op.rstrip("XYZ")
-            worst[kind] = max(worst[kind], angle / SINGLE)
+            worst[kind] = max(worst[kind], angle / SINGLE_ROUNDOFF)
     # The error of an angle above 256 degrees is at most 2^-16 degrees; the errors of several angles add.
     assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
     assert 1.0 < worst["Orient"] <= 4.0

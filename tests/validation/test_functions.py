@@ -169,7 +169,7 @@ def test_the_diagnosis_names_a_reversed_joint_and_exchanged_joints(name: str, qu
 def without_mimic_columns(robot: Robot, frame: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
     """Return a Jacobian to which the columns of mimic joints are not added."""
     free = urdfkin.load(robot.source, mimic=False, verify=False, **options)
-    own = [free.rate_names.index(x) for x in robot.rate_names]
+    own = [free.velocity_names.index(x) for x in robot.velocity_names]
     return lambda q: free.jacobian(free.from_pinocchio(robot.to_pinocchio(q)), frame)[:, own]
 
 

@@ -33,10 +33,10 @@ from urdfkin.compiled.plan import turned
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, steps_between
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
+from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.mimic import Coupling
-from urdfkin.model.path import ElementaryMotion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
 
 
@@ -120,7 +120,9 @@ class ParametricChain:
         is None, this method computes the poses.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
-        T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
+        T, twists = self.path.pose_and_jacobian_from_frames(
+            self.path.frames(amounts) if frames is None else frames
+        )
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, drive in enumerate(self._drives):
             if drive.parameter is not None:
@@ -144,7 +146,7 @@ class ParametricChain:
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
-        return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
+        return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
 #: Largest angle (rad) between two axes of a table that are treated as parallel.
@@ -223,7 +225,7 @@ class CalibrationModel:
         motion = np.eye(4)
         for what, turns, axis in SIX:
             if what in values:
-                motion = motion @ elementary(axis, turns, values[what])
+                motion = motion @ elementary_pose(axis, turns, values[what])
         return motion
 
 
@@ -286,10 +288,10 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
     parameters of the neighbouring moving joints have the same effect.
     """
-    path: FrameChain = chain(tree, tip, base)
+    path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
     builder.end("base")
-    steps = steps_between(tree, tip, base)
+    steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
         only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)
@@ -334,7 +336,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
                 unit = "rad" if turns else "m"
                 motions.append(Drive(axis, turns, builder.parameter(row.joint, cell, unit, cells[cell])))
             else:
-                motions.append(elementary(axis, turns, cells[cell]))
+                motions.append(elementary_pose(axis, turns, cells[cell]))
         joint = builder.joint(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
         along, between = [*motions[:2], joint], motions[2:]
         standard = table.convention is DHConvention.STANDARD

@@ -29,8 +29,8 @@ from urdfkin.calibration.write_back import Rewritten
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
-from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.chain import FrameChain, make_chain
+from urdfkin.model.configuration import sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree, pose
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import as_robot
@@ -115,7 +115,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     robot = as_robot(robot)
     origins = read_calibration(path, order)
     prefix = _prefix(robot)
-    calibrated = chain(calibrated_tree(origins), "tool0", "base")
+    calibrated = make_chain(calibrated_tree(origins), "tool0", "base")
     if _all_turn_about_z(robot, prefix):
         result = Rewritten(robot, {prefix + joint: T for joint, T in origins.items()})
     else:
@@ -189,8 +189,8 @@ def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> 
 
     The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
     """
-    paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
+    paths = [make_chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
+    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

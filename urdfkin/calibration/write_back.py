@@ -14,7 +14,7 @@ import numpy as np
 from urdfkin.comparison.diff import Changes, diff
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import log_rotation, quaternion_of, rpy_of
-from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -71,7 +71,7 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
         word
-        if abs(x - was) <= max(_ROUNDING, ANGLE * EPS * abs(was))
+        if abs(x - was) <= max(_ROUNDING, ANGLE_ROUNDINGS * EPS * abs(was))
         else format_numbers([round(x, _DECIMALS)])
         for word, x, was in zip(words, new.tolist(), old, strict=True)
     )
@@ -86,7 +86,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     """
     roll, pitch, yaw = rpy_of(R).tolist()
     # If roll and yaw have the same axis, only their sum or difference is defined.
-    if math.cos(pitch) <= ANGLE * EPS:
+    if math.cos(pitch) <= ANGLE_ROUNDINGS * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -124,7 +124,7 @@ class Rewritten:
     def moved(self) -> dict[str, tuple[float, float]]:
         """The translation (m) and the rotation (rad) of each joint's origin."""
         tree = self.robot.tree
-        old = {name: tree.joints[tree.joint_index(name)].unlocked.T_parent_joint for name in self.origins}
+        old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {
             name: (
                 float(np.linalg.norm(T[:3, 3] - old[name][:3, 3])),

@@ -36,7 +36,7 @@ from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
@@ -201,7 +201,7 @@ def _write_tree(request: DHRequest) -> Answer:
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
     check_line = "\n".join([str(check or check_of_path(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
-        q = draw(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
+        q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"\n{check_line}\n{printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)

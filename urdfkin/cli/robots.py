@@ -184,9 +184,9 @@ def _convention_data(conversion: Conversion) -> dict[str, Any]:
         "title": convention.title,
         "joints": list(conversion.joint_names),
         "q": list(conversion.coordinate_names),
-        "v": list(conversion.rate_names),
+        "v": list(conversion.velocity_names),
         "quaternion": convention.quaternion,
-        "six_vectors": convention.six,
+        "six_vectors": convention.six_vectors,
         "evidence": convention.evidence,
         "sources": list(convention.sources),
         "note": convention.note,
@@ -194,11 +194,11 @@ def _convention_data(conversion: Conversion) -> dict[str, Any]:
 
 
 def _conversion_code(start: Conversion, end: Conversion) -> Answer:
-    from urdfkin.model.conventions import reordering
+    from urdfkin.model.conventions import find_reordering
 
     a, b = start.convention.name, end.convention.name
-    found = {letter: reordering(letter, start, end) for letter in "qv"}
-    names = {"q": end.coordinate_names, "v": end.rate_names}
+    found = {letter: find_reordering(letter, start, end) for letter in "qv"}
+    names = {"q": end.coordinate_names, "v": end.velocity_names}
 
     def code() -> Iterator[str]:
         for letter, one in found.items():

@@ -106,7 +106,7 @@ def _study(
     """
     import numpy as np
 
-    from urdfkin.model.configuration import draw_base
+    from urdfkin.model.configuration import draw_base_motion
     from urdfkin.validation.accuracy import accuracy_study
     from urdfkin.validation.robot_input import subject
     from urdfkin.validation.store import FailedStudy
@@ -116,7 +116,7 @@ def _study(
         robot = subject(source, **how)
         if is_same := stamp in (None, robot.stamp):
             rng = np.random.default_rng([settings.seed, 1])
-            base = draw_base(settings.samples, rng) if settings.moving_base else None
+            base = draw_base_motion(settings.samples, rng) if settings.moving_base else None
             return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
             "the robot file has changed since the validation read the file",

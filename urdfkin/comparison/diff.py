@@ -26,7 +26,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.numbers import parse_float
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
@@ -207,7 +207,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             for tree, name in zip(result.trees, (pair.a, pair.b), strict=True)
         )
         if a.kind.nv == b.kind.nv and a.kind.turns == b.kind.turns:
-            single = SINGLE if result.single else 0.0
+            single = SINGLE_ROUNDOFF if result.single else 0.0
             for one in limit_differences(a, b, result.rounding[1], single):
                 yield from _change_of(one)
     # The readers of MJCF and USD add the link "world" as the root.

@@ -31,8 +31,8 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import axis_range, largest_value, values_within
-from urdfkin.model.path import elementary
+from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
+from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
 #: A property is reported if its deviation is at most this angle (rad) and this length (m).
@@ -92,7 +92,7 @@ class Structure:
       point of the first axis that is nearest to the base's origin.
     - The first joint is prismatic, or no joint moves: the base's origin.
 
-    A prismatic joint without limits makes `reach` infinite; its samples are within `WIDEST` of zero.
+    A prismatic joint without limits makes `reach` infinite; its samples are within `ASSUMED_LIMIT` of zero.
     """
 
     robot: str
@@ -271,8 +271,8 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
-    values = values_within(ranges, _SAMPLES)
-    return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
+    values = sample_uniform(ranges, _SAMPLES)
+    return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -297,11 +297,11 @@ class Opw:
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
         T = (
-            elementary(2, True, t[0])
-            @ elementary(1, True, t[1] + t[2])
-            @ elementary(2, True, t[3])
-            @ elementary(1, True, t[4])
-            @ elementary(2, True, t[5])
+            elementary_pose(2, True, t[0])
+            @ elementary_pose(1, True, t[1] + t[2])
+            @ elementary_pose(2, True, t[3])
+            @ elementary_pose(1, True, t[4])
+            @ elementary_pose(2, True, t[5])
         )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1
@@ -330,7 +330,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = values_within([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
+    q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
     expected, best, reason = free.placement(q), None, ""
     for reference in _candidate_tables(path):
         try:

@@ -14,7 +14,7 @@ from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion,
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
-from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.configuration import TRAVEL_CONDITION, coordinate_names, units
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
@@ -382,7 +382,7 @@ def pictures(
         T_b = T_a[0] @ base_as_written(ours, theirs) @ inverse(T_b[0]) @ T_b
     else:
         i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
-        T_b = T_a[i] @ inverse(ours.homes[i]) @ found.base @ theirs.homes[j] @ inverse(T_b[j]) @ T_b
+        T_b = T_a[i] @ inverse(ours.zero_poses[i]) @ found.base @ theirs.zero_poses[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
     drawn = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:
@@ -417,7 +417,7 @@ def _draw(
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), NOT_ZERO)
+    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), MIN_DIVISOR)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     ruler = round_length(2.0 * HALF * SCALE / scale)
     bar = {"x": -HALF * FILLED, "y": HALF - FOOT, "width": round(ruler * scale, 1), "words": length(ruler)}

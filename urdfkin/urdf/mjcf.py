@@ -28,9 +28,9 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import rotation_about, rotation_of
+from urdfkin.kinematics.rotation import rotation_about, rotation_from_quaternion
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -205,7 +205,7 @@ class Mjcf:
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint. The bound is this number times `MJCF_RULE` and `EPS`.
+        rules from y to an independent joint. The bound is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.mimic_equalities}
@@ -363,7 +363,7 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
             yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active))
     useless = dict(_find_unused_elements(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
-        if words in useless:
+        if useless.pop(words, None):
             yield MjcfRemark(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
@@ -374,7 +374,7 @@ def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
     """Yield a finding if a file declares degrees, but all its hinge limits are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
-    if 0.0 < largest <= LARGEST_ANGLE:
+    if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
         what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
         yield MjcfRemark(
             what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees'
@@ -574,4 +574,4 @@ def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
 
 
 def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
-    return pose(rotation_of(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)
+    return pose(rotation_from_quaternion(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

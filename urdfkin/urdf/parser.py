@@ -107,7 +107,7 @@ def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     try:
         text.decode("utf-8")
     except UnicodeDecodeError as error:
-        claim = f", although the file declares {declared}" if declared else ""
+        claim = f", and the file declares {declared}" if declared else ""
         message = f"a byte is not UTF-8{claim}"
         remedy = "save the file as UTF-8"
         found = f"0x{text[error.start]:02x}"
@@ -123,9 +123,10 @@ def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> b
     if version is not None and version[1] != b"1.0":
         found = quote(version[1].decode())
         report.add(XML_VERSION, "the XML version is not 1.0", found=found, remedy='write version="1.0"')
-    if declared is None or _find_codec(declared) in ("utf-8", "ascii"):
+    codec = None if declared is None else _find_codec(declared)
+    if declared is None or codec == "utf-8" or (codec == "ascii" and text.isascii()):
         return True
-    if text.isascii() and _ASCII_SUPERSETS.match(_find_codec(declared) or ""):
+    if text.isascii() and _ASCII_SUPERSETS.match(codec or ""):
         message = "the declared encoding is not UTF-8, but every character is ASCII"
         match = _ENCODING.search(text)
         fix = None if match is None else Fix((Edit(*match.span(1), "UTF-8"),))
@@ -208,7 +209,12 @@ def read_document(report: Reporter) -> Element | None:
         if builder.max_depth > ORACLE_DEPTH:
             rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
         what = f"elements are nested {builder.max_depth} deep"
-        report.add(rule, what, builder.deepest_element, remedy=f"{reader} more than {most}")
+        report.add(
+            rule,
+            what,
+            builder.deepest_element,
+            remedy=f"remove the nesting: {reader} more than {most} levels",
+        )
     return builder.root
 
 
@@ -278,16 +284,16 @@ class _Builder:
             found = f"{len(attributes)} in <{shorten(tag)}>, more than {most.attributes}"
             self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
         if len(tag) > most.name:
-            self.refuse_name("an element", tag)
+            self.refuse_name("the tag of an element", tag)
         for key, value in attributes.items():
             if len(key) > most.name:
-                self.refuse_name("an attribute", key)
+                self.refuse_name("the name of an attribute", key)
             if len(value) > most.name and key in _NAME_ATTRIBUTES:
-                self.refuse_name("a link or joint", value)
+                self.refuse_name(f"the {key} of <{shorten(tag)}>", value)
 
-    def refuse_name(self, owner: str, name: str) -> None:
+    def refuse_name(self, what: str, name: str) -> None:
         found = f"{quote(name, 30)} of {len(name)} characters, more than {self.limits.name}"
-        self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
+        self.refuse(NAME_TOO_LONG, "name", f"{what} is too long", found)
 
     def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
         remedy = f"if the file is correct, raise the limit with --max-{limit}"
@@ -331,7 +337,9 @@ class _Builder:
             remedy, found = "remove the declaration, which is ignored", quote(f"<!DOCTYPE {name}>")
             self.report.add(DOCTYPE, message, found=found, remedy=remedy, position=position)
             return
-        what = "contains definitions" if has_subset else "refers to an external definition"
+        what = "refers to an external definition"
+        if has_subset:
+            what = "has brackets [ ], which can contain definitions"
         found = quote(f"<!DOCTYPE {name} [...") if system is None else quote(system)
         message = f"the document type declaration {what}"
         remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
@@ -414,11 +422,15 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`."""
+    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`.
+
+    `effect` is appended to these messages.
+    """
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
     bad_vector: Rule = BAD_VECTOR
+    effect: str = ""
 
     def read_scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """Return a number; `default` if the attribute is missing, None if the number is invalid."""
@@ -452,7 +464,7 @@ class NumberReader:
                 return None
             values.append(value)
         if len(values) != count:
-            message = f"{attribute} needs {count} numbers, but has {len(values)}"
+            message = f"{attribute} needs {count} numbers, but has {len(values)}{self.effect}"
             remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quote(written)}"
             self.report.add(
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
@@ -472,9 +484,9 @@ class NumberReader:
             return value
         what = attribute if element.tag in _ELEMENTS_NOT_NAMED else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
-        message, remedy = f"{part}{what} is not a number", _remedy(piece)
+        message, remedy = f"{part}{what} is not a number{self.effect}", _remedy(piece)
         if value is not None:
-            message, remedy = f"{part}{what} is too large for a double", "check the exponent"
+            message, remedy = f"{part}{what} is too large for a double{self.effect}", "check the exponent"
         found = quote(piece)
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
@@ -741,7 +753,8 @@ class JointReader:
         if both:
             add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of these attributes")
         elif zero:
-            add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
+            what = "has no usable length" if any(quaternion) else "is zero"
+            add(BAD_QUATERNION, f"the quaternion {what}", 'the identity is "0 0 0 1"')
         else:
             joint.quaternion = quaternion
             message = "urdfkin uses quat_xyzw, but most readers ignore this rotation"
@@ -752,7 +765,8 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
-            NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE).read_vector(axis, "xyz")
+            effect = f"; a {joint.kind} joint ignores its axis"
+            NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE, effect).read_vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
             joint.axis = self.numbers.read_vector(axis, "xyz")

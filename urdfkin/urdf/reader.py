@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_from_quaternion, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -73,7 +73,7 @@ def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
     """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
-    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
+    return rpy_of(rotation_from_quaternion(scaled / np.linalg.norm(scaled)))
 
 
 def _normalize(axis: FloatArray, joint: str) -> FloatArray:
@@ -90,8 +90,8 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     # In urdfdom, the default of a position limit is zero.
     # In the URDF specification, position limits of a continuous joint have no effect.
     return Limit(
-        lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
-        upper=(limit.upper or 0.0) if kind.bounded else math.inf,
+        lower=(limit.lower or 0.0) if kind.has_limits else -math.inf,
+        upper=(limit.upper or 0.0) if kind.has_limits else math.inf,
         velocity=math.inf if limit.velocity is None else limit.velocity,
         effort=math.inf if limit.effort is None else limit.effort,
     )

@@ -31,10 +31,10 @@ from typing import Any, Literal
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.rotation import quaternion_of, rotation_from_quaternion
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -490,7 +490,7 @@ class _StageReader:
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
-            if np.ptp(scale) > _MAX_SHEAR * SINGLE * scale.max():
+            if np.ptp(scale) > _MAX_SHEAR * SINGLE_ROUNDOFF * scale.max():
                 return f"the scale {', '.join(f'{x:g}' for x in scale)} of {prim.GetPath()}"
         return None
 
@@ -507,7 +507,7 @@ class _StageReader:
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
-        if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE * prim.GetPath().pathElementCount:
+        if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
             message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
             raise InputError(message, where=where, found=self._find_uneven_scale(prim), remedy=remedy)
@@ -598,10 +598,11 @@ class _StageReader:
             self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
         kind_name = str(prim.GetTypeName()).removeprefix("Physics")
-        if self._read_value(prim, "physics:excludeFromArticulation") or kind_name.endswith(
-            _UNSUPPORTED_JOINTS
-        ):
-            what = f"a tree cannot represent this {kind_name}, which is outside the articulation"
+        excluded = self._read_value(prim, "physics:excludeFromArticulation")
+        if excluded or kind_name.endswith(_UNSUPPORTED_JOINTS):
+            what = f"a tree cannot represent this {kind_name}"
+            if excluded:
+                what = f"this {kind_name} is excluded from the articulation"
             self._report("left-out-of-usd", path, what)
             return None
         kind, axis, limits, free = self._read_motion(prim)
@@ -634,7 +635,7 @@ class _StageReader:
             found = f"{p.tolist()}, {quaternion}"
             raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
         off = float(np.linalg.norm(_rounding(p))) * self._meters_per_unit, _quaternion_rounding(xyzw)
-        R, p = rotation_of(xyzw / size), p * self._meters_per_unit
+        R, p = rotation_from_quaternion(xyzw / size), p * self._meters_per_unit
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
@@ -669,7 +670,7 @@ class _StageReader:
                     turned |= rotates
                     moved |= not rotates or str(prim.GetPath()) != path
             prim = prim.GetParent()
-        return SINGLE * length if moved else 0.0, 2.0 * SINGLE if turned else 0.0
+        return SINGLE_ROUNDOFF * length if moved else 0.0, 2.0 * SINGLE_ROUNDOFF if turned else 0.0
 
     def _is_instanced(self, path: object) -> bool:
         return any(str(path).startswith(one) for one in self._instancers)
@@ -931,7 +932,7 @@ class _StageReader:
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
         name, here, there = edge.name, links[parent], links[child]
-        mimic_error = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
+        mimic_error = SINGLE_ROUNDOFF if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         lever = float(np.linalg.norm(B[:3, 3]))
         self._single_precision[name] = *edge.rounding, edge.length_sum, mimic_error, lever
         if kind is JointKind.FIXED:
@@ -974,12 +975,16 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _NEGLIGIBLE_DEGREES < largest <= LARGEST_ANGLE and upper > lower:
+        if turns and _NEGLIGIBLE_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            what = f"a prismatic joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
+            absent, value = "limits", f"+-{SLIDE_LIMIT:g}"
+            if math.isfinite(lower) or math.isfinite(upper):
+                absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
+                value += f"{SLIDE_LIMIT:g}"
+            what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
             lower, upper = (x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
@@ -1130,7 +1135,7 @@ class _StageReader:
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._meters_per_unit
-            if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
+            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._is_scaled(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._meters_per_unit:g}"
                 remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
@@ -1143,7 +1148,9 @@ class _StageReader:
     def _is_scaled(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
-        return bool((np.abs(scale - 1.0) <= _MAX_SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
+        return bool(
+            (np.abs(scale - 1.0) <= _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount).all()
+        )
 
     def _is_resolved(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""

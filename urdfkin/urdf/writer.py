@@ -38,7 +38,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
     # A joint without position limits has no <limit> element if all other limits are infinite.
-    return any(infinite) and (joint.kind.bounded or not all(infinite))
+    return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 
 def _write_joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
@@ -59,8 +59,8 @@ def _write_joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
 
 
 def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
-    bounded = joint.kind.bounded
-    if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
+    has_limits = joint.kind.has_limits
+    if has_limits and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
         message = "a URDF needs finite position limits for a revolute or prismatic joint"
         remedy = "give the joint limits, or make it continuous if it rotates without limits"
         found = "none" if limit is None else f"{limit.lower} to {limit.upper}"
@@ -68,7 +68,7 @@ def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
     if limit is None:
         return
     named = [("effort", limit.effort), ("velocity", limit.velocity)]
-    if bounded:
+    if has_limits:
         named = [("lower", limit.lower), ("upper", limit.upper), *named]
     finite = [f'{name}="{float(value)!r}"' for name, value in named if math.isfinite(value)]
     if finite:

@@ -23,7 +23,7 @@ from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -370,7 +370,7 @@ class _Run:
 
     def check(self) -> FunctionCheck:
         robot = self.robot
-        drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH):
@@ -482,7 +482,7 @@ class _Run:
         reference = self.reference if reference is None else reference
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
         jacobian = partial(self.robot.jacobian, ours[0], frame or self.frame, reference, verify=False)
-        return self.conversion.result(self.row.name, ours, result, jacobian)
+        return self.conversion.convert_result(self.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
@@ -493,7 +493,7 @@ class _Run:
         assert conversion is not None
         if name == "placement":
             return scale
-        scale = conversion.six(scale, 1)
+        scale = conversion.reorder_six_vector(scale, 1)
         if name in ("velocity", "acceleration"):
             return scale
         if not conversion.is_constant and name != "jacobian":
@@ -520,7 +520,7 @@ class _Run:
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
-        if conversion.permutation is not None and conversion.rate_permutation is not None:
+        if conversion.permutation is not None and conversion.velocity_permutation is not None:
             return 0.0
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
@@ -583,7 +583,7 @@ class _Run:
     def _column_names(self) -> tuple[str, ...]:
         if not self.row.columns:
             return ()
-        return (self.conversion or self.robot).rate_names
+        return (self.conversion or self.robot).velocity_names
 
 
 @dataclass

@@ -23,8 +23,8 @@ import numpy as np
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
 from urdfkin.errors.escape import printable
-from urdfkin.kinematics.roundings import EPS, MJCF_RULE
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.kinematics.roundings import EPS, MJCF_RULE_ROUNDINGS
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
@@ -125,9 +125,9 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     q = unpacked(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
     # The factor 2 allows for the rounded angles in the URDF text.
-    size = mujoco_magnitudes(magnitudes(plan, q, None, None, STILL_STATE))
+    size = mujoco_magnitudes(magnitudes(plan, q, None, None, FIXED_BASE_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))
@@ -166,7 +166,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     columns = sorted(rules)
     residuals, sizes = residuals[:, columns], sizes[:, columns]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.abs(residuals) / (MJCF_RULE * EPS * sizes)
+        share = np.abs(residuals) / (MJCF_RULE_ROUNDINGS * EPS * sizes)
     share = np.where(residuals == 0.0, 0.0, share)
     if not (share <= 1.0).all():
         k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)

@@ -14,8 +14,8 @@ from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
-from urdfkin.kinematics.roundings import EPS, of_a_fit
-from urdfkin.model.configuration import WIDEST
+from urdfkin.kinematics.roundings import EPS, fit_roundings
+from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
@@ -170,7 +170,7 @@ class TableComparison:
     @property
     def rounding(self) -> float:
         """Largest tip error that rounding can cause, in radians, or in metres per metre of reach."""
-        return EPS * of_a_fit(len(self.reference.rows))
+        return EPS * fit_roundings(len(self.reference.rows))
 
     @property
     def rounding_metres(self) -> float:
@@ -198,7 +198,7 @@ class TableComparison:
         """
         rows = self.reference.rows
         free = [row.joint for row in rows if not row.kind.turns and not has_range(row.limit)]
-        return f"{', '.join(free)} within {WIDEST:g} m of zero" if free else ""
+        return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
 
     @property
     def as_written(self) -> bool:

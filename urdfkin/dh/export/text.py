@@ -238,7 +238,7 @@ class PrintedPrecision:
     """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits.
 
     If `unlimited` is true, a prismatic joint has no limits. The error and the bound then assume a travel of
-    at most `WIDEST`.
+    at most `ASSUMED_LIMIT`.
     """
 
     digits: int

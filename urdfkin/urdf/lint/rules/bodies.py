@@ -157,7 +157,8 @@ def _check_geometry(
     capsule = None if geometry is None else geometry.find("capsule")
     if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
-        report.add(GEOMETRY, message, capsule, remedy="use a cylinder and two spheres")
+        remedy = 'write version="1.1" in <robot>, or use a cylinder and two spheres'
+        report.add(GEOMETRY, message, capsule, remedy=remedy)
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
@@ -204,9 +205,12 @@ def _find_defined_materials(report: Reporter, robot: RobotRecord) -> set[str]:
     for material in robot.element.find_all("material"):
         name = material.attributes.get("name", "")
         if name in defined:
-            message = "another material of the robot has this name; urdfdom refuses the file"
+            what, found = "two materials of the robot have no name", None
+            if name:
+                what, found = "another material of the robot has this name", quote(name)
+            message = f"{what}; urdfdom refuses the file"
             remedy = f"the first is on line {defined[name].line}; remove one of these materials"
-            report.add(MATERIAL_TWICE, message, material, attribute="name", found=quote(name), remedy=remedy)
+            report.add(MATERIAL_TWICE, message, material, attribute="name", found=found, remedy=remedy)
         defined.setdefault(name, material)
     inside = {
         material.attributes.get("name", "")
@@ -258,6 +262,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
         elif _is_missing_file(filename, urdf_path):
             _report_file(report, mesh, filename)
     for package, meshes in missing.items():
+        remedy = "add the package's folder to ROS_PACKAGE_PATH" if package else "write package://NAME/PATH"
         report.add(
             MESH_MISSING,
             f"package {quote(package)} of {_count(len(meshes))} is not found"
@@ -266,7 +271,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
             meshes[0],
             attribute="filename",
             found=quote(meshes[0].attributes["filename"]),
-            remedy="add the package's folder to ROS_PACKAGE_PATH; kinematics needs no mesh",
+            remedy=f"{remedy}; kinematics needs no mesh",
         )
 
 
@@ -302,7 +307,7 @@ def _exists(path: Path) -> bool:
 
 def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
     message = "the mesh is not found"
-    remedy = "kinematics needs no mesh"
+    remedy = "correct the filename, or add the file; kinematics needs no mesh"
     report.add(MESH_MISSING, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 

@@ -58,7 +58,7 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
-        message = "xmlns puts the elements into a namespace, so most readers do not find the elements"
+        message = "xmlns puts the elements into a namespace; readers that support namespaces find no links"
         found = quote(root.attributes["xmlns"])
         report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
@@ -238,6 +238,8 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     remedy = f"did you mean <{close}>?" if close else "remove the element"
     if element.tag in _POSE_NAMES_ELSEWHERE:
         remedy = f"write {_EXAMPLES['origin']}"
+    elif element.tag in EXTENSIONS:
+        remedy = "keep the element if another program needs it"
     severity = Severity.NOTE if element.tag in EXTENSIONS else None
     report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
@@ -422,12 +424,15 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
         report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
+        remedy = (
+            ", or load without root_joint" if root_joint else " before you load the robot with root_joint"
+        )
         report.add(
             RESERVED_NAME,
             f"the name is reserved for {what}",
             element,
             attribute="name",
-            remedy="rename the link or joint" + ("" if root_joint else ", or load without root_joint"),
+            remedy=f"rename the {element.tag}{remedy}",
             severity=Severity.ERROR if root_joint else None,
         )
 
@@ -440,7 +445,7 @@ def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
-            message = "another name looks the same, but has different characters"
+            message = "another name looks the same or nearly the same, but has different characters"
             remedy = "use only one of the two spellings"
             found = ascii(name) + " and " + ascii(first)
             report.add(LOOKALIKE, message, element, attribute="name", found=found, remedy=remedy)

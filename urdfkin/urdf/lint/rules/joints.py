@@ -164,7 +164,9 @@ def check_axes(report: Reporter, robot: RobotRecord) -> None:
 
 def _axis_text(joint: JointRecord) -> str:
     axis = joint.axis_element
-    return f"xyz={quote(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+    if axis is None:
+        return 'the default "1 0 0"'
+    return f"xyz={quote(axis.attributes['xyz'])}" if "xyz" in axis.attributes else "<axis> without xyz"
 
 
 def _check_axis(report: Reporter, joint: JointRecord) -> None:
@@ -410,7 +412,7 @@ class _MimicChecker:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        from urdfkin.model.configuration import allowed_range, range_words
+        from urdfkin.model.configuration import format_range, restrict_range
         from urdfkin.model.tree import Limit
 
         rule, leader = self.resolve_chain(mimic)
@@ -418,14 +420,14 @@ class _MimicChecker:
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
-        low, high = allowed_range(rule, bounds, *moving)
+        low, high = restrict_range(rule, bounds, *moving)
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
         # Rounding errors narrow a range of one value to an empty range.
-        single = [f"only {end:.6g}" for end in moving if allowed_range(rule, bounds, end, end) == (end, end)]
-        allowed = f"only {range_words((low, high))}" if low < high else (*single, "no value")[0]
-        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
+        allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {format_range(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
@@ -564,14 +566,15 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
+    named = f"-{_pi_text(multiple)}" if meant < 0.0 else _pi_text(multiple)
     moves = f", which moves the links below by up to {_length_text(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
-        f"rpy contains a rounded {_pi_text(multiple)}, off by {off:.1e} rad{moves}",
+        f"rpy contains a rounded {named}, off by {off:.1e} rad{moves}",
         origin,
         attribute="rpy",
         found=quote(text),
-        remedy=f"write {meant!r} if you mean {_pi_text(multiple)}; urdfkin uses the value in the file",
+        remedy=f"write {meant!r} if you mean {named}; urdfkin uses the value in the file",
         severity=Severity.WARNING if off * reach > NOTICEABLE_DISPLACEMENT else None,
         weight=off * reach,
         fix=lambda: report.make_value_fix(
@@ -664,7 +667,7 @@ def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
         first = places.setdefault(place, joint)
         if first is not joint:
             message = f"the joint has the same origin and axis as joint {quote(first.name)}"
-            remedy = "ignore this finding if both joints are intended"
+            remedy = "correct one of the two origins, or ignore this note if both joints are intended"
             report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
@@ -690,5 +693,5 @@ def _check_total_length(report: Reporter, robot: RobotRecord, reach: dict[str, f
         found = quote(element.attributes.get("xyz", ""))
         report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
     elif 0.0 < whole < SUSPICIOUS_ROBOT_SIZE:
-        message = f"the sum of all lengths of the robot is {_length_text(whole)}"
+        message = f"the joint origins along the longest chain of the robot add up to {_length_text(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")
