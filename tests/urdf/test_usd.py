@@ -767,7 +767,7 @@ def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch
     for k in range(200):  # the process may have 64 open files
         part.Export(str(path.with_name(f"part{k}.usdc")))
     assert loaded(path).nq == 2
-    monkeypatch.setattr(usd, "_LAYERS", 100)
+    monkeypatch.setattr(usd, "_MAX_LAYERS", 100)
     with pytest.raises(InputError, match="too many layers: found over 100"):
         usd.find_layer_files(usd.import_openusd(), str(path))
 
