@@ -37,8 +37,8 @@ class TreeOracle:
         self.offset = np.array([j.mimic.offset if j.mimic else 0.0 for j in moving])
         self.G = np.zeros((len(moving), tree.nq))
         for row, joint in enumerate(moving):
-            leader = tree.joint_index(joint.mimic.leader if joint.mimic else joint.name)
-            self.G[row, tree.q_index[leader]] = joint.mimic.multiplier if joint.mimic else 1.0
+            mimicked_joint = tree.joint_index(joint.mimic.mimicked_joint if joint.mimic else joint.name)
+            self.G[row, tree.q_index[mimicked_joint]] = joint.mimic.multiplier if joint.mimic else 1.0
 
     def frame(self, link: str) -> int:
         return int(self.model.getFrameId(link, pin.FrameType.BODY))

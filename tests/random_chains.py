@@ -103,8 +103,8 @@ def trees(
             joints.append((Joint(f"f{i}", JointKind.FIXED, 0, pose, np.eye(3)[0]), link, f"m{i}"))
             link, pose = f"m{i}", np.eye(4)
         axis = local[2, :3]
-        leader = Mimic("j0", draw(st.floats(-2, 2)), draw(st.floats(-1, 1)))
-        mimic = leader if mimics and i and draw(st.integers(0, 5)) == 0 else None
+        mimicked_joint = Mimic("j0", draw(st.floats(-2, 2)), draw(st.floats(-1, 1)))
+        mimic = mimicked_joint if mimics and i and draw(st.integers(0, 5)) == 0 else None
         limit = None if kind is JointKind.CONTINUOUS else Limit(-1.0, 1.0, 1.0, 1.0)
         joints.append(
             (Joint(f"j{i}", kind, 0, pose, axis / np.linalg.norm(axis), limit, mimic), link, f"l{i + 1}")

@@ -76,11 +76,13 @@ def trees(draw: st.DrawFn, *, max_joints: int = 8, kinds: tuple[JointKind, ...] 
     rows: list[tuple[Joint, str, str]] = []
     for number, name in enumerate(joint_names):
         kind = draw(st.sampled_from(kinds))
-        leaders = [joint.name for joint, _, _ in rows if joint.kind in AXIAL and joint.mimic is None]
+        independent_joints = [
+            joint.name for joint, _, _ in rows if joint.kind in AXIAL and joint.mimic is None
+        ]
         mimic = None
-        if kind in AXIAL and leaders and draw(st.integers(0, 3)) == 0:
-            leader = draw(st.sampled_from(leaders))
-            mimic = Mimic(leader, draw(st.floats(-2.0, 2.0)), draw(st.floats(-1.0, 1.0)))
+        if kind in AXIAL and independent_joints and draw(st.integers(0, 3)) == 0:
+            mimicked_joint = draw(st.sampled_from(independent_joints))
+            mimic = Mimic(mimicked_joint, draw(st.floats(-2.0, 2.0)), draw(st.floats(-1.0, 1.0)))
         axis = draw(axes()) if kind.has_axis else np.array([1.0, 0.0, 0.0])
         joint = Joint(name, kind, 0, draw(poses()), axis, limit=draw(limits(kind)), mimic=mimic)
         rows.append((joint, links[draw(st.integers(0, number))], links[number + 1]))

@@ -91,7 +91,7 @@ class _Joint:
         if self.kind == "planar":
             assert axis.tolist() == [0, 0, 1], "x and y of another plane are no part of the standard"
         rule = element.find("mimic") if self.kind != "fixed" else None
-        self.leader = _of(rule, "joint", "")
+        self.mimicked_joint = _of(rule, "joint", "")
         self.multiplier = mp.mpf(_of(rule, "multiplier", "1"))
         self.offset = mp.mpf(_of(rule, "offset", "0"))
 
@@ -115,8 +115,8 @@ class Robot:
         version = root.get("version", "1.0")
         self.joints = {joint.get("name", ""): _Joint(joint, version) for joint in root.findall("joint")}
         for joint in self.joints.values():
-            if joint.leader not in self.joints:  # the joint moves independently
-                joint.leader = ""
+            if joint.mimicked_joint not in self.joints:  # the joint moves independently
+                joint.mimicked_joint = ""
         self.links = [link.get("name", "") for link in root.findall("link")]
         self.above = {joint.child: name for name, joint in self.joints.items()}
 
@@ -138,16 +138,16 @@ class Robot:
     def rule(self, name: str) -> tuple[str, Any, Any]:
         """Return the independent joint that a joint mimics, with multiplier and offset."""
         joint = self.joints[name]
-        if not joint.leader:
+        if not joint.mimicked_joint:
             return name, mp.mpf(1), mp.mpf(0)
-        leader, multiplier, offset = self.rule(joint.leader)
-        return leader, joint.multiplier * multiplier, joint.multiplier * offset + joint.offset
+        mimicked_joint, multiplier, offset = self.rule(joint.mimicked_joint)
+        return mimicked_joint, joint.multiplier * multiplier, joint.multiplier * offset + joint.offset
 
     def own(self, name: str, values: Mapping[str, Value]) -> Value:
         """Return the value of a joint, which may be a mimic joint or a fixed joint."""
-        leader, multiplier, offset = self.rule(name)
-        value = values.get(leader)
-        return value if leader == name else multiplier * value + offset
+        mimicked_joint, multiplier, offset = self.rule(name)
+        value = values.get(mimicked_joint)
+        return value if mimicked_joint == name else multiplier * value + offset
 
     def pose(self, link: str, values: Mapping[str, Value]) -> Any:
         """Return the pose (4, 4) of a link in the root."""
@@ -195,12 +195,14 @@ class Robot:
             joint = self.joints[name]
             before = T @ joint.origin
             T = before @ joint.motion(self.own(name, values))
-            leader, multiplier, _ = self.rule(name)
+            mimicked_joint, multiplier, _ = self.rule(name)
             if joint.kind in ("revolute", "continuous", "prismatic"):
                 z = before[:3, :3] @ joint.axis
-                axes.append((columns[leader], multiplier, z, joint.kind != "prismatic", before[:3, 3]))
+                axes.append(
+                    (columns[mimicked_joint], multiplier, z, joint.kind != "prismatic", before[:3, 3])
+                )
             for k, (i, turns) in enumerate(_FREE.get(str(joint.kind), ())):
-                axes.append((columns[leader] + k, multiplier, T[:3, i], turns, T[:3, 3]))
+                axes.append((columns[mimicked_joint] + k, multiplier, T[:3, i], turns, T[:3, 3]))
         points = {"local": T[:3, 3], "local_world_aligned": T[:3, 3], "world": _UNIT[:3, 3]}
         found: dict[tuple[str, int], Any] = {}
         for reference, point in points.items():

@@ -17,8 +17,8 @@ def limit(lower: object = -1, upper: object = 1) -> str:
     return f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
 
 
-def mimic(leader: str, multiplier: object = 1, offset: object = 0) -> str:
-    return f'<mimic joint="{leader}" multiplier="{multiplier}" offset="{offset}"/>'
+def mimic(mimicked_joint: str, multiplier: object = 1, offset: object = 0) -> str:
+    return f'<mimic joint="{mimicked_joint}" multiplier="{multiplier}" offset="{offset}"/>'
 
 
 def joint(

@@ -263,10 +263,10 @@ class _Robot:
         if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
         # A mimic joint mimics only a joint with a lower number, so there is no cycle.
-        leaders = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
-        if not leaders:
+        independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
+        if not independent_joints:
             return ""
-        words = [f"joint={quoteattr(self.joints[rng.choice(leaders)])}"]
+        words = [f"joint={quoteattr(self.joints[rng.choice(independent_joints)])}"]
         if rng.random() < 0.9:
             words.append(f'multiplier="{written(rng, odd_factor(rng))}"')
         if rng.random() < 0.6:

@@ -46,11 +46,11 @@ CHANGES = [
      "_ = normalise_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')"),
     ("kinematics.rotation.normalise_quaternions", "quat / norms", "quat * norms"),
     ("model.tree.KinematicTree._offsets",
-     "(int(own[i]) for i in leaders)", "(int(own[i]) for i in range(len(self.joints)))"),
+     "(int(own[i]) for i in independent_joints)", "(int(own[i]) for i in range(len(self.joints)))"),
     ("model.tree._last_name_first", "reverse=True", ""),
     ("urdf.reader._mimic_rules", "rule.multiplier * end.offset", "end.offset"),
     ("urdf.reader._mimic_rules", "rule.multiplier * end.multiplier", "rule.multiplier"),
-    ("urdf.reader._mimic_rules", "end.leader", "'b'"),
+    ("urdf.reader._mimic_rules", "end.mimicked_joint", "'b'"),
     ("verify.oracle.resolved_rules", "rule.multiplier * end.offset", "end.offset"),
     ("verify.oracle.resolved_rules", "rule.multiplier * end.multiplier", "rule.multiplier"),
     # the tree and the plan
@@ -86,7 +86,7 @@ CHANGES = [
     # Pinocchio's side
     ("verify.oracle.free_flyer_second_rates",
      "acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])", "acc[..., :3]"),
-    ("verify.oracle.PinocchioLayout.__init__", "at[rule.leader]", "at[rule.leader][::-1]"),
+    ("verify.oracle.PinocchioLayout.__init__", "at[rule.mimicked_joint]", "at[rule.mimicked_joint][::-1]"),
     ("verify.oracle.Frames.index", "self._bodies.get(name)", "self._bodies.get(name[5:])"),
     ("verify.oracle.OracleQuery.rows.pick",
      "spread[np.unravel_index(numbers, self.shape)]",

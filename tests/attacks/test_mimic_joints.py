@@ -39,7 +39,9 @@ def text(*rules: tuple[object, object]) -> str:
 
 def mimic_chain(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
     """Write a chain; joint j(i+1) mimics the joint with the number in rule i, with multiplier and offset."""
-    return chain(["", *(mimic(f"j{leader}", *rule) for leader, *rule in rules)], origin=origin)
+    return chain(
+        ["", *(mimic(f"j{mimicked_joint}", *rule) for mimicked_joint, *rule in rules)], origin=origin
+    )
 
 
 def misread(document: str, wrong: str) -> Robot:
@@ -121,10 +123,10 @@ def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st
     ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs == ours  # the same doubles
     angles = [0.7]  # apply the rules one after the other
-    for i, (leader, multiplier, offset) in enumerate(rules, start=1):
-        angles.append(multiplier * angles[leader] + offset)
+    for i, (mimicked_joint, multiplier, offset) in enumerate(rules, start=1):
+        angles.append(multiplier * angles[mimicked_joint] + offset)
         for rule in (theirs[f"j{i}"], ours[f"j{i}"]):
-            assert rule.leader == "j0"
+            assert rule.mimicked_joint == "j0"
             assert rule.multiplier * 0.7 + rule.offset == pytest.approx(angles[i], abs=1e-12)
 
 

@@ -78,7 +78,12 @@ EDITED: list[tuple[str, Any, Any, str]] = [
     ("joint", ("placement", 0, 0), 3.0, "its placement is not a rigid transform"),
     ("joint", "q", 4, "wrong index in q or v"),
     ("joint", "v", None, "wrong index in q or v"),
-    ("joint", "mimic", {"leader": "nobody", "multiplier": 1.0, "offset": 0.0}, "it cannot mimic nobody"),
+    (
+        "joint",
+        "mimic",
+        {"mimicked_joint": "nobody", "multiplier": 1.0, "offset": 0.0},
+        "it cannot mimic nobody",
+    ),
     ("chain", "base", "nowhere", "no frame nowhere"),
     ("chain", "bound_ratio", 3.0, "verified, but something lies outside its bound"),
     ("chain", "samples", 0, "but the tables have disagreements"),

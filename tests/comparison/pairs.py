@@ -118,8 +118,14 @@ def with_axes_reversed(tree: KinematicTree, names: Collection[str]) -> Kinematic
 
     def change(joint: Joint) -> Joint:
         if joint.mimic is not None:
-            own, leader = (-1.0 if name in names else 1.0 for name in (joint.name, joint.mimic.leader))
-            rule = Mimic(joint.mimic.leader, own * leader * joint.mimic.multiplier, own * joint.mimic.offset)
+            own, mimicked_joint = (
+                -1.0 if name in names else 1.0 for name in (joint.name, joint.mimic.mimicked_joint)
+            )
+            rule = Mimic(
+                joint.mimic.mimicked_joint,
+                own * mimicked_joint * joint.mimic.multiplier,
+                own * joint.mimic.offset,
+            )
             joint = replace(joint, mimic=rule)
         if joint.name not in names:
             return joint
@@ -141,7 +147,7 @@ def with_zeros_moved(tree: KinematicTree, offsets: Mapping[str, float]) -> Kinem
     def change(joint: Joint) -> Joint:
         if joint.mimic is not None:
             rule = joint.mimic
-            more = offsets.get(joint.name, 0.0) - rule.multiplier * offsets.get(rule.leader, 0.0)
+            more = offsets.get(joint.name, 0.0) - rule.multiplier * offsets.get(rule.mimicked_joint, 0.0)
             joint = replace(joint, mimic=replace(rule, offset=rule.offset + more))
         if joint.name not in offsets:
             return joint
@@ -162,7 +168,7 @@ def renamed(tree: KinematicTree) -> KinematicTree:
 def with_names(tree: KinematicTree, joints: Mapping[str, str], links: Mapping[str, str]) -> KinematicTree:
     rows = []
     for joint, parent, child in branches(tree):
-        rule = joint.mimic and replace(joint.mimic, leader=joints[joint.mimic.leader])
+        rule = joint.mimic and replace(joint.mimic, mimicked_joint=joints[joint.mimic.mimicked_joint])
         rows.append((replace(joint, name=joints[joint.name], mimic=rule), links[parent], links[child]))
     return build_tree(tree.name, links[tree.links[0]], rows)
 

@@ -48,8 +48,10 @@ def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], inter
     """Return the largest distance (m) that a global search finds, computed at fifty digits."""
     path = a.tree.path(a.tree.link_index(interval.frame))
     along = (a.tree.joints[i] for i in path)
-    leaders = {joint.mimic.leader if joint.mimic else joint.name for joint in along if joint.kind.nv}
-    joints = [joint for joint in a.tree.joints if joint.name in leaders]
+    independent_joints = {
+        joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in along if joint.kind.nv
+    }
+    joints = [joint for joint in a.tree.joints if joint.name in independent_joints]
     places = [a.tree.q_index[a.tree.joint_index(joint.name)] for joint in joints]
     ends = [
         (j.limit.lower, j.limit.upper) if j.limit and math.isfinite(j.limit.lower) else (-math.pi, math.pi)

@@ -160,9 +160,11 @@ def test_a_comparison_of_equal_robots_takes_a_few_seconds_at_most(name: str, sec
 
 def fingers(names: str, tilt: float, multiplier: float, offset: float) -> Robot:
     """Return a palm with two fingers; the second finger mimics the first."""
-    palm, a, b, leader, follower = names.split()
-    rule = limit() + mimic(leader, multiplier, offset)
-    first = joint(leader, "revolute", palm, a, f'xyz="-0.03 0 0.05" rpy="0 {tilt} 0"', "0 -1 0", limit())
+    palm, a, b, mimicked_joint, follower = names.split()
+    rule = limit() + mimic(mimicked_joint, multiplier, offset)
+    first = joint(
+        mimicked_joint, "revolute", palm, a, f'xyz="-0.03 0 0.05" rpy="0 {tilt} 0"', "0 -1 0", limit()
+    )
     second = joint(follower, "revolute", palm, b, 'xyz="0.03 0 0.05"', "0 1 0", rule)
     return built(first, second, verify=False)
 

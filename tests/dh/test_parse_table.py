@@ -330,15 +330,19 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
         ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: `sense` must be 1 or -1: found 1.9"),
         ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: `sense` must be 1 or -1: found '-1.5'"),
         (
-            "[{joint = 'left', a = 1}, {joint = 'right', mimic = {leader = 'lefft'}}]", {},
-            "row 2, leader: unknown joint 'lefft'; did you mean left.*coordinates",
+            "[{joint = 'left', a = 1}, {joint = 'right', mimic = {mimicked_joint = 'lefft'}}]", {},
+            "row 2, mimicked_joint: unknown joint 'lefft'; did you mean left.*coordinates",
         ),
         (
-            "[{joint='a', mimic={leader='c'}}, {joint='b', mimic={leader='a'}}, {joint='c'}]", {},
-            "row 2, leader: a joint cannot mimic a mimic joint: found 'a'",
+            "[{joint='a', mimic={mimicked_joint='c'}}, {joint='b', mimic={mimicked_joint='a'}}, {joint='c'}]",
+            {},
+            "row 2, mimicked_joint: a joint cannot mimic a mimic joint: found 'a'",
         ),
-        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot mimic a mimic joint"),
-        ("[{mimic = {leader = 'b', factor = 2}}]", {}, "row 1: unknown key in mimic: found 'factor'"),
+        (
+            "[{joint = 'a', mimic = {mimicked_joint = 'a'}}]", {},
+            "row 1, mimicked_joint: a joint cannot mimic a mimic joint",
+        ),
+        ("[{mimic = {mimicked_joint = 'b', factor = 2}}]", {}, "row 1: unknown key in mimic: found 'factor'"),
         ("[{joint = 'a', limit = {min = 2}}]", {}, "row 1: unknown key in limit: found 'min'"),
         ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: `lower` is above `upper`: found 2 and 1"),
         ("[{joint = 'a', limit = {lower = nan}}]", {}, "row 1, lower: not a finite number: found nan"),
@@ -363,7 +367,7 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
         ("'none'", {}, "rows: a table needs a list of rows: found 'none'"),
         ("[[0, 0, 0, 0, 'X']]", {}, "row 1, kind: the kind of a row must be revolute, continuous or"),
         ("[{a = 0, alhpa = 1}]", {}, "unknown key in a row: found 'alhpa'"),
-        ("[{mimic = 'j1'}]", {}, "`mimic` must have the form {leader"),
+        ("[{mimic = 'j1'}]", {}, "`mimic` must have the form {mimicked_joint"),
         ("[{a = 1}]", {"anlges": "'degrees'"}, "unknown key in a table: found 'anlges'"),
         ("[{a = 1}]", {"convention": "'dh'"}, "unknown convention: found 'dh'"),
         ("[{a = 1}]", {"convention": ""}, "does not name its convention"),
@@ -447,7 +451,10 @@ def test_units_apply_to_base_tool_limits_and_mimic_joints() -> None:
         "rows": [
             {"joint": "turn", "a": 400, "limit": {"lower": -90, "upper": 180, "velocity": 90}},
             {"joint": "slide", "kind": "P", "limit": {"lower": -50, "upper": 500}},
-            {"joint": "follow", "kind": "P", "mimic": {"leader": "slide", "offset": 10, "multiplier": 2}},
+            {
+                "joint": "follow", "kind": "P",
+                "mimic": {"mimicked_joint": "slide", "offset": 10, "multiplier": 2},
+            },
         ],
     }  # fmt: skip
     table = table_from_mapping(data)
@@ -482,9 +489,9 @@ def test_a_mimicked_joint_outside_the_path_is_a_coordinate_also_after_writing() 
         assert again.joint_names == table.joint_names
         own = table.coupling.select(robot.tree, q)
         np.testing.assert_array_equal(again.placement(own), table.placement(own))
-        mistyped = text.replace('leader": "panda_finger_joint1', 'leader": "panda_finger_joint2').replace(
-            'leader = "panda_finger_joint1', 'leader = "panda_finger_jointl'
-        )
+        mistyped = text.replace(
+            'mimicked_joint": "panda_finger_joint1', 'mimicked_joint": "panda_finger_joint2'
+        ).replace('mimicked_joint = "panda_finger_joint1', 'mimicked_joint = "panda_finger_jointl')
         if mistyped != text:
             with pytest.raises((UnknownNameError, InputError)):
                 table_from_text(mistyped, f".{form}")
@@ -498,7 +505,7 @@ _GOOD: dict[str, Any] = {
     "rows": [
         {"joint": "j1", "kind": "R", "a": 0.1, "alpha": 0.2, "d": 0.3, "theta": 0.4, "beta": 0.0, "sense": 1,
          "limit": {"lower": -1, "upper": 1, "velocity": 1, "effort": 1}},
-        {"joint": "j2", "a": 0.1, "mimic": {"leader": "j1", "multiplier": 2, "offset": 0.5}},
+        {"joint": "j2", "a": 0.1, "mimic": {"mimicked_joint": "j1", "multiplier": 2, "offset": 0.5}},
         [0.1, "pi/2", 0.3, 0.0, "P"],
     ],
 }  # fmt: skip

@@ -367,9 +367,13 @@ def test_a_locked_joint_is_named_in_the_errors_about_q() -> None:
 
 
 def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_it() -> None:
-    leader, follows = joint("x", "revolute", "a", "b", axis="1 0 0", more=limit()), mimic("x", 2)
+    mimicked_joint, follows = joint("x", "revolute", "a", "b", axis="1 0 0", more=limit()), mimic("x", 2)
     good, impossible = (
-        loaded(urdfs.robot(leader, joint("y", "revolute", "b", "c", "", "1 0 0", follows + limit(low, 9))))
+        loaded(
+            urdfs.robot(
+                mimicked_joint, joint("y", "revolute", "b", "c", "", "1 0 0", follows + limit(low, 9))
+            )
+        )
         for low in (0, 3)
     )
     assert good.with_locked_joints({"x": 0.5}).nq == 0

@@ -114,7 +114,7 @@ def test_a_tiny_change_of_a_joint_is_reported() -> None:
 def test_a_changed_mimic_rule_and_a_missing_or_new_joint_are_reported() -> None:
     before, after = (cast("Any", arms())["robots"][1]["model"] for _ in range(2))
     before["joints"][2]["mimic"] = None
-    after["joints"][2]["mimic"] = {"leader": "wheel", "multiplier": -2.0, "offset": 0.25}
+    after["joints"][2]["mimic"] = {"mimicked_joint": "wheel", "multiplier": -2.0, "offset": 0.25}
     (told,) = model_changes(before, after)
     assert told[0].endswith(", mimic rule")
     assert told[1:] == ("none", "-2 * wheel +0.25")

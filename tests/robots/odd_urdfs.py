@@ -52,10 +52,10 @@ class Urdf:
         reach = {"prismatic": 0.6, "revolute": 2.5}.get(kind)
         more = "" if reach is None else limit(-reach, reach)
         if mimic is not None:
-            leader, multiplier, offset = mimic
+            mimicked_joint, multiplier, offset = mimic
             given = "" if multiplier is None else f' multiplier="{multiplier!r}"'
             given += "" if offset is None else f' offset="{offset!r}"'
-            more += f'<mimic joint="{leader}"{given}/>'
+            more += f'<mimic joint="{mimicked_joint}"{given}/>'
         self.joints.append(urdfs.joint(joint, kind, above, link, origin, axis, more))
         self.links.append(link)
         return joint
@@ -92,16 +92,20 @@ def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
     """Return five fingers of eight joints, 30 of which mimic one of the other 10 by a random rule."""
     urdf, rng = Urdf(name, seed), np.random.default_rng(seed)
     for finger in range(5):
-        parent, leaders = 0, list[str]()
+        parent, independent_joints = 0, list[str]()
         for phalanx in range(8):
             kind = "prismatic" if sliding and phalanx % 3 == 2 else ("revolute", "continuous")[phalanx % 2]
             rule, leads = None, phalanx in (0, 3)
             if not leads:
-                rule = leaders[-1], float(rng.normal()), float(rng.normal()) if phalanx % 2 else None
+                rule = (
+                    independent_joints[-1],
+                    float(rng.normal()),
+                    float(rng.normal()) if phalanx % 2 else None,
+                )
             made = urdf.add(kind, parent, joint=f"f{finger}_{phalanx}", mimic=rule)
             parent = len(urdf.links) - 1
             if leads:
-                leaders.append(made)
+                independent_joints.append(made)
     return urdf.text
 
 
@@ -109,16 +113,16 @@ def random_tree(seed: int) -> str:
     """Return fourteen joints of every kind at random links; some mimic an earlier joint."""
     urdf, rng = Urdf(f"tree_{seed}", seed), np.random.default_rng(seed + 1000)
     kinds = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
-    leaders: list[str] = []
+    independent_joints: list[str] = []
     for _ in range(14):
         kind = str(rng.choice(kinds, p=(0.3, 0.15, 0.2, 0.15, 0.1, 0.1)))
         single = kind in ("revolute", "continuous", "prismatic")
         rule = None
-        if single and leaders and rng.random() < 0.3:
-            rule = (str(rng.choice(leaders)), float(rng.normal()), float(rng.normal()))
+        if single and independent_joints and rng.random() < 0.3:
+            rule = (str(rng.choice(independent_joints)), float(rng.normal()), float(rng.normal()))
         made = urdf.add(kind, int(rng.integers(len(urdf.links))), mimic=rule)
         if single and rule is None:
-            leaders.append(made)
+            independent_joints.append(made)
     return urdf.text
 
 

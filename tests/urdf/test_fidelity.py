@@ -84,7 +84,7 @@ def test_a_chain_of_mimic_joints_is_resolved() -> None:
     more = f'<link name="x"/>{third}'
     robot = verified(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>', more=more))
     rule = present(robot.tree.joints[2].mimic)
-    assert (rule.leader, rule.multiplier) == ("j1", -6.0)
+    assert (rule.mimicked_joint, rule.multiplier) == ("j1", -6.0)
     assert rule.offset == pytest.approx(3 * 0.1 + 0.5)
 
 

@@ -158,7 +158,7 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(wri
     assert "MuJoCo" in certificate.reading
     assert "Pinocchio's MJCF reader" in str(certificate)
     rule = next(present(joint.mimic) for joint in robot.tree.joints if joint.name == "f")
-    assert (rule.leader, rule.multiplier) == ("pitch", 2.0)
+    assert (rule.mimicked_joint, rule.multiplier) == ("pitch", 2.0)
     assert rule.offset == pytest.approx(0.1 - math.pi / 3)  # f - 0 = 0.1 + 2 (pitch - 30 degrees)
     assert loaded(TWO, mimic=False).nq == robot.nq + 1
 
@@ -336,7 +336,7 @@ def test_a_chain_of_equalities_becomes_mimic_rules_that_agree_with_mujoco() -> N
     assert robot.coordinate_names == ("a",)
     b, c = (present(joint.mimic) for joint in robot.tree.joints if joint.name in "bc")
     # b + 0.4 = 0.1 + 2 (a - 0.3), c - 0.5 = 0.2 - 3 (b + 0.4)
-    assert (b.leader, b.multiplier, c.leader, c.multiplier) == ("a", 2.0, "a", -6.0)
+    assert (b.mimicked_joint, b.multiplier, c.mimicked_joint, c.multiplier) == ("a", 2.0, "a", -6.0)
     assert (b.offset, c.offset) == pytest.approx((-0.9, 0.7 - 3.0 * -0.5))
     robot.placement(robot.sample(3), "c")
     certificate = robot.certificate()
@@ -362,7 +362,7 @@ def wrong_offset(right: Callable[..., Any]) -> Callable[..., Any]:
 def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
     def resolved(rules: Any, follower: str) -> Any:
         found = right(rules, follower)
-        chained = found.leader != rules[follower].leader
+        chained = found.mimicked_joint != rules[follower].mimicked_joint
         return replace(found, multiplier=rules[follower].multiplier) if chained else found
 
     return resolved

@@ -270,7 +270,7 @@ def test_mimic_joints_follow_their_rule(read: Read, schema: str, words: str, exp
     links = BASE + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
     robot = read(links + SHOULDER + follower)
     rule = present(robot.tree.joints[1].mimic)
-    assert (robot.nq, rule.leader) == (1, "shoulder")
+    assert (robot.nq, rule.mimicked_joint) == (1, "shoulder")
     assert (rule.multiplier, rule.offset) == pytest.approx(expected)
     # The stage shows the mimic joint at angle 0, which the rule with an offset does not allow.
     assert codes(robot) == ({"USD304": "/arm/hand"} if rule.offset else {})
@@ -286,7 +286,7 @@ def test_a_mimic_rule_between_an_angle_and_a_length_is_not_scaled_and_is_reporte
     robot = read(with_schemas(NEWTON, FOLLOWS.format("shoulder") + "float newton:mimicCoef1 = 0.5"))
     assert codes(robot) == {"USD203": "/arm/rail"}
     (mimic,) = [joint.mimic for joint in robot.tree.joints if joint.mimic]
-    assert (mimic.leader, mimic.multiplier) == ("shoulder", 0.5)
+    assert (mimic.mimicked_joint, mimic.multiplier) == ("shoulder", 0.5)
 
 
 def test_value_clips_are_refused_before_their_files_are_read(write: Write) -> None:
@@ -506,7 +506,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     ),
     "a lost target": (ARM + joint("lost", "Fixed", "upper", "nowhere"), ["USD201 /arm/lost"]),
     "a body without a joint": (ARM + body("stray"), ["USD202 /arm/stray"]),
-    "a mimic rule without its leader": (with_schemas(NEWTON), ["USD203 /arm/rail"]),
+    "a mimic rule without a mimicked joint": (with_schemas(NEWTON), ["USD203 /arm/rail"]),
     "a disabled mimic rule": (
         with_schemas(NEWTON, FOLLOWS.format("shoulder") + "bool newton:mimicEnabled = false"),
         ["USD101 /arm/rail: the mimic rule of this joint is disabled"],
@@ -929,7 +929,7 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{transcode(rule.leader)}")
+        words = FOLLOWS.format(f"joints/{transcode(rule.mimicked_joint)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
     if one.limit is not None and one.kind.has_limits:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
@@ -1109,8 +1109,10 @@ def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
         return robot
     root = ElementTree.fromstring(robot.urdf)
     moving = [one for one in robot.tree.joints if one.kind.nq == 1]
-    leader, follower = next(two for two in combinations(moving, 2) if two[0].kind.turns == two[1].kind.turns)
-    rule = {"joint": leader.name, "multiplier": "-0.5", "offset": "0.1"}
+    mimicked_joint, follower = next(
+        two for two in combinations(moving, 2) if two[0].kind.turns == two[1].kind.turns
+    )
+    rule = {"joint": mimicked_joint.name, "multiplier": "-0.5", "offset": "0.1"}
     [element] = [one for one in root.iterfind("joint") if one.get("name") == follower.name]
     ElementTree.SubElement(element, "mimic", rule)
     return loaded(ElementTree.tostring(root, encoding="unicode"))

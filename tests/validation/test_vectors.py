@@ -162,12 +162,12 @@ class Sizes:
             joint = robot.joints[name]
             if joint.angles is not None:
                 e += sum(map(abs, joint.angles)) / 2
-            leader, m, _ = robot.rule(name)
+            mimicked_joint, m, _ = robot.rule(name)
             X, error, count = self._mimic(name, at, sample)
             rules += count
             turns = joint.kind in ("revolute", "continuous")
             e += error + (count - 1) / 2 * X if turns and count else 0.0
-            own = at.get(leader, {"q": (0, 0), "v": (0, 0)})
+            own = at.get(mimicked_joint, {"q": (0, 0), "v": (0, 0)})
             q, v, a = (sample[key][slice(*own["q" if key == "q" else "v"])] for key in "qva")
             L = float(np.linalg.norm(joint.origin[:3, 3].astype(float)))
             if joint.kind == "prismatic":
@@ -179,7 +179,7 @@ class Sizes:
             self.p += L
             if turns or joint.kind == "prismatic":
                 s, s_2 = abs(float(m) * v[0]), abs(float(m) * a[0])
-                self.columns.append((at[leader]["v"][0], abs(float(m)), turns, order))
+                self.columns.append((at[mimicked_joint]["v"][0], abs(float(m)), turns, order))
             if turns:
                 self.w += s
                 self.d += self.w * s + s_2
@@ -193,17 +193,17 @@ class Sizes:
                 self.w += turn
                 self.u += slide
                 self.d += self.w * turn + turn_2
-                first = at[leader]["v"][0]
+                first = at[mimicked_joint]["v"][0]
                 self.columns += [(first + i, 1.0, i >= k, order) for i in range(len(v))]
         self.nv = len(sample["v"])
         self.roundings = 24 * (len(self.path) + 1) + e + 1.5 * rules
 
     def _mimic(self, name: str, at: Mapping[str, Any], sample: Mapping[str, Any]) -> tuple[float, float, int]:
         joint = self.robot.joints[name]
-        if not joint.leader:
+        if not joint.mimicked_joint:
             q = sample["q"][slice(*at[name]["q"])] if name in at else []
             return abs(q[0]) if q else 0.0, 0.0, 0
-        x, error, count = self._mimic(joint.leader, at, sample)
+        x, error, count = self._mimic(joint.mimicked_joint, at, sample)
         m, c = abs(float(joint.multiplier)), abs(float(joint.offset))
         return m * x + c, m * error + 1.5 * m * x + c, count + 1
 

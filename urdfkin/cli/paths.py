@@ -95,7 +95,7 @@ def chain_command(
                     "name": joint.name,
                     "kind": joint.kind.value,
                     "backwards": joint.backwards,
-                    "follows": joint.mimic.leader if joint.mimic else None,
+                    "follows": joint.mimic.mimicked_joint if joint.mimic else None,
                     "axis": z.tolist(),
                     "origin": origin.tolist(),
                     "interorigin": d.tolist(),
@@ -116,7 +116,7 @@ def chain_command(
 
 
 def _kind_of_joint(joint: Any) -> str:
-    mimics = f", mimics {joint.mimic.leader}" if joint.mimic else ""
+    mimics = f", mimics {joint.mimic.mimicked_joint}" if joint.mimic else ""
     return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{mimics}"
 
 

@@ -121,7 +121,7 @@ class DistanceSearch:
         for joint, at in zip(tree_a.joints, tree_a.q_index, strict=True):
             if joint.nq == 1:
                 q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
-        for name, line in self.variables.leaders.items():
+        for name, line in self.variables.coordinates.items():
             q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.evaluate(values)
         return q_a, q_b
 
@@ -301,7 +301,7 @@ class BoxBounds:
             for joint in trees[0].joints
             if joint.nv == 1
         }
-        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
+        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.coordinates), strict=True):
             for joint, line in own.items():
                 if line.variable in names:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope

@@ -256,7 +256,9 @@ def _rename_like_a(result: Sameness) -> KinematicTree:
             names[joint.name] = old.joints[old.link_index(link) - 1].name
 
     def rule(joint: Joint) -> Mimic | None:
-        return joint.mimic and replace(joint.mimic, leader=names.get(joint.mimic.leader, joint.mimic.leader))
+        return joint.mimic and replace(
+            joint.mimic, mimicked_joint=names.get(joint.mimic.mimicked_joint, joint.mimic.mimicked_joint)
+        )
 
     joints = tuple(
         replace(joint, name=names.get(joint.name, joint.name), mimic=rule(joint)) for joint in tree.joints
@@ -323,7 +325,7 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
     i, k = old.joint_index(name), new.joint_index(name)
     joint = new.joints[k]
     ends = [(tree.links[tree.joints[j].parent], tree.links[j + 1]) for tree, j in ((old, i), (new, k))]
-    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in names):
+    if ends[0] != ends[1] or (joint.mimic and joint.mimic.mimicked_joint not in names):
         return None
     joints = list(old.joints)
     joints[i] = replace(joint, parent=joints[i].parent)

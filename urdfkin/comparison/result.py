@@ -186,7 +186,11 @@ class Difference:
 
 
 def _format_rule(rule: Value) -> str:
-    return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if isinstance(rule, Mimic) else "free"
+    return (
+        f"{rule.multiplier!r} {rule.mimicked_joint} {rule.offset:+.17g}"
+        if isinstance(rule, Mimic)
+        else "free"
+    )
 
 
 def _idle_words(values: Value) -> str:
@@ -873,8 +877,8 @@ def remarks(
     # A joint can be independent in B and a mimic joint in A, although all joint values agree.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
-        line = variables.leaders.get(b.name)
-        if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.leader}":
+        line = variables.coordinates.get(b.name)
+        if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.mimicked_joint}":
             some.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
     for tree, other, which in (
         (alignment.a.tree, alignment.b.tree, "A"),

@@ -840,8 +840,10 @@ class JointComparison:
         place = f"joint {self.trees[0].joints[step.a].name}"
         if a is None and b is None:
             return
-        if a is None or b is None or self.alignment.names.get(a.leader) != b.leader:
-            yield JointDifference(place, "mimic joint", *(one.leader if one else "none" for one in (a, b)))
+        if a is None or b is None or self.alignment.names.get(a.mimicked_joint) != b.mimicked_joint:
+            yield JointDifference(
+                place, "mimic joint", *(one.mimicked_joint if one else "none" for one in (a, b))
+            )
             return
         share = float(self.errors[0][step.a, 2] + self.errors[1][step.b, 2])
         for what in ("multiplier", "offset"):

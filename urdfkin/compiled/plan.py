@@ -112,7 +112,7 @@ class CompiledTree:
     offsets: FloatArray
     columns: IntArray
     multipliers: FloatArray
-    leaders: IntArray
+    sum_columns: IntArray
     q_indices: tuple[int, ...]
     parents: IntArray
     lengths: FloatArray
@@ -158,7 +158,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
     steps, geometry = _steps(tree, needed, anchors)
     parents = [anchors[tree.joints[i].parent].step for i in needed]
     columns, multipliers = _columns(steps, geometry)
-    leaders = _leaders(columns, parents, [anchors[link].step for link in links])
+    sum_columns = _find_sum_columns(columns, parents, [anchors[link].step for link in links])
     places = zip(steps[:, StepField.Q].tolist(), needed, strict=True)
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
@@ -174,7 +174,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         offsets=np.array([_flatten_pose(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
-        leaders=leaders[order],
+        sum_columns=sum_columns[order],
         q_indices=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
@@ -258,8 +258,8 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
     return columns, geometry[columns[:, ColumnField.STEP], Geometry.MULTIPLIER].copy()
 
 
-def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
+def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
+    sum_columns = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):
         ancestors, step = set[int](), end
@@ -269,8 +269,8 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
         first: dict[int, int] = {}
         for c, column in enumerate(rows):
             if column[ColumnField.STEP] in ancestors:
-                leaders[frame, c] = first.setdefault(column[ColumnField.V], c)
-    return leaders
+                sum_columns[frame, c] = first.setdefault(column[ColumnField.V], c)
+    return sum_columns
 
 
 # -- the program -----------------------------------------------------------------------------------------
@@ -530,11 +530,11 @@ class _ProgramWriter:
         return moved
 
     def _add_columns(self, f: int) -> None:
-        for c, leader in enumerate(self.plan.leaders[f].tolist()):
-            if leader >= 0:
+        for c, mimicked_joint in enumerate(self.plan.sum_columns[f].tolist()):
+            if mimicked_joint >= 0:
                 multiplier = float(self.plan.multipliers[c])
                 multiplier_index = 0 if multiplier == 1.0 else self._add_constants(multiplier)
-                to = c if self.hessian else leader
+                to = c if self.hessian else mimicked_joint
                 flags = int(self.plan.columns[c, ColumnField.IS_ROTATION]) + 2 * (to != c)
                 rows = self.axis_rows + AXIS_ROWS * c, self.column_rows + COLUMN_ROWS * to
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
@@ -546,7 +546,7 @@ class _ProgramWriter:
         """
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
-        for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
+        for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):
             sources[:, plan.columns[c, ColumnField.V]] = row + COLUMN_ROWS * c + np.arange(6)
         return sources.ravel().tolist()
 
@@ -556,9 +556,9 @@ class _ProgramWriter:
         The integers are the number of columns, then `HESSIAN_COLUMN_WIDTH` integers for each column, and then
         the scratch rows of the result.
         """
-        columns, leaders = self.plan.columns, self.plan.leaders[f]
-        own = np.flatnonzero(leaders >= 0)
-        rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
+        columns, sum_columns = self.plan.columns, self.plan.sum_columns[f]
+        own = np.flatnonzero(sum_columns >= 0)
+        rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * sum_columns[own]
         pairs = np.column_stack(
             (rows[0], columns[own, ColumnField.STEP], columns[own, ColumnField.V], rows[1])
         )

@@ -65,14 +65,18 @@ def to_tree(table: DHTable) -> KinematicTree:
     joints = _serial_joints(table, [(_tree_kind(row), _tree_limit(row), row.mimic) for row in table.rows])
     triples = list(zip(joints, links, links[1:], strict=False))
     names = {row.joint for row in table.rows}
-    for leader in table.joint_names:
-        if leader not in names:
-            turns = next(row.kind.turns for row in table.rows if row.mimic and row.mimic.leader == leader)
+    for mimicked_joint in table.joint_names:
+        if mimicked_joint not in names:
+            turns = next(
+                row.kind.turns
+                for row in table.rows
+                if row.mimic and row.mimic.mimicked_joint == mimicked_joint
+            )
             kind, limit = (
                 (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, DEFAULT_PRISMATIC_LIMIT)
             )
-            joint = Joint(leader, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
-            triples.append((joint, links[0], _make_unique(f"{leader}_link", links)))
+            joint = Joint(mimicked_joint, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
+            triples.append((joint, links[0], _make_unique(f"{mimicked_joint}_link", links)))
     return build_tree(table.robot, links[0], triples)
 
 

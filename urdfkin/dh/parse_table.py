@@ -42,7 +42,7 @@ _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_fram
 #: A line `# key: value` in CSV; `table_from_mapping` rejects unknown keys.
 _CSV_SETTING = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
 _NAMES = {
-    **{name: name for name in ("leader", "multiplier", "sense", *LIMIT_KEYS)},
+    **{name: name for name in ("mimicked_joint", "multiplier", "sense", *LIMIT_KEYS)},
     **dict.fromkeys(("a", "link length", "length"), "a"),
     **dict.fromkeys(("alpha", "link twist", "twist"), "alpha"),
     **dict.fromkeys(("d", "link offset"), "d"),
@@ -325,7 +325,9 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
         elif column.name == "kind":
             row["kind"] = _KINDS.get(cell, cell)
         else:
-            row[column.name] = from_csv_cell(_unescape(cell)) if column.name in ("joint", "leader") else cell
+            row[column.name] = (
+                from_csv_cell(_unescape(cell)) if column.name in ("joint", "mimicked_joint") else cell
+            )
     return _nest_row(row)
 
 
@@ -356,7 +358,7 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 
     If the row has no mimic rule, the cell `offset` is added to theta or d.
     """
-    mimic: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
+    mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
     limit = {key: row.pop(key) for key in LIMIT_KEYS if key in row}
@@ -393,7 +395,7 @@ def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
             if names[number - 1] == joints[i] and abs(cell.factor) == 1.0:
                 row["sense"] = cell.factor
             else:
-                row["mimic"] = {"leader": names[number - 1], "multiplier": cell.factor}
+                row["mimic"] = {"mimicked_joint": names[number - 1], "multiplier": cell.factor}
     if elsewhere := [name for name in coordinates if name not in joints]:
         data.setdefault("coordinates", elsewhere)
 

@@ -7,14 +7,14 @@ All formats are converted to the same mapping:
     lengths = "millimetres"         # default: metres
     robot, base_frame, tip_frame    # names, optional
     base, tool                      # 4 x 4 (or 3 x 4); default: the identity
-    coordinates = ["leader", ...]   # only for mimicked joints that have no row
+    coordinates = ["j7", ...]       # only for mimicked joints that have no row
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
 joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
-row is {leader, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units apply to
-cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio of two
-joint values in SI units. An effort is in N or N m.
+row is {mimicked_joint, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units
+apply to cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio
+of two joint values in SI units. An effort is in N or N m.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _KINDS = {
     "continuous": JointKind.CONTINUOUS,
     "prismatic": JointKind.PRISMATIC,
 }
-_MIMIC_KEYS, LIMIT_KEYS = ("leader", "multiplier", "offset"), ("lower", "upper", "velocity", "effort")
+_MIMIC_KEYS, LIMIT_KEYS = ("mimicked_joint", "multiplier", "offset"), ("lower", "upper", "velocity", "effort")
 _ROW_KEYS = ("joint", "kind", *_CELLS, "sense", "mimic", "limit")
 _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
@@ -231,7 +231,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
             found=found,
-            remedy="for a mimic joint write mimic = {leader, multiplier, offset}",
+            remedy="for a mimic joint write mimic = {mimicked_joint, multiplier, offset}",
         )
     return {"kind": kind, **fields, name: cell.constant, "sense": cell.factor}
 
@@ -309,13 +309,13 @@ def _parse_joint_value(name: str, value: Any, fields: Mapping[str, Any], units: 
 def _parse_mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Mimic | None:
     if value is None:
         return None
-    if not isinstance(value, Mapping) or "leader" not in value:
+    if not isinstance(value, Mapping) or "mimicked_joint" not in value:
         raise InputError(
-            "`mimic` must have the form {leader, multiplier, offset}", where=where, found=repr(value)
+            "`mimic` must have the form {mimicked_joint, multiplier, offset}", where=where, found=repr(value)
         )
     check_keys(value, _MIMIC_KEYS, "mimic", where)
     return Mimic(
-        parse_name(value["leader"], f"{where}, leader"),
+        parse_name(value["mimicked_joint"], f"{where}, mimicked_joint"),
         parse_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
         _parse_joint_value("offset", value.get("offset", 0.0), fields, units, where),
     )
@@ -427,17 +427,18 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
     independent = {row.joint for row in rows if row.mimic is None}
     known = [*independent, *(parse_name(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
-        if row.mimic is None or row.mimic.leader in known:
+        if row.mimic is None or row.mimic.mimicked_joint in known:
             continue
-        where = f"row {i + 1}, leader"
-        if any(row.mimic.leader == other.joint for other in rows):
+        where = f"row {i + 1}, mimicked_joint"
+        if any(row.mimic.mimicked_joint == other.joint for other in rows):
             raise InputError(
                 "a joint cannot mimic a mimic joint",
                 where=where,
-                found=repr(row.mimic.leader),
-                remedy=f"mimic the leader of {row.mimic.leader!r}, with the product of the two multipliers",
+                found=repr(row.mimic.mimicked_joint),
+                remedy=f"mimic the joint that {row.mimic.mimicked_joint!r} mimics,"
+                " with the product of the two multipliers",
             )
-        error = UnknownNameError("joint", row.mimic.leader, known, where=where)
+        error = UnknownNameError("joint", row.mimic.mimicked_joint, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"
         raise error
 

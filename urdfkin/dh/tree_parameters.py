@@ -54,8 +54,9 @@ class TreeRow:
     Attributes:
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        leader: Name of the mimicked joint; the joint's own name if it mimics no other joint.
-        multiplier: Factor of the mimic rule: the joint's value is multiplier * q_leader + offset.
+        mimicked_joint: Name of the mimicked joint; the joint's own name if it mimics no other joint.
+        multiplier: Factor of the mimic rule. The value of a mimic joint is
+            multiplier * (value of the mimicked joint) + offset.
     """
 
     joint: str
@@ -69,7 +70,7 @@ class TreeRow:
     beta: float
     theta: float
     r: float
-    leader: str
+    mimicked_joint: str
     multiplier: float = 1.0
     offset: float = 0.0
 
@@ -96,7 +97,7 @@ class TreeParameters:
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the independent moving joints, in the tree's order: the columns of `q`."""
-        return tuple(row.joint for row in self.rows if row.sigma < 2 and row.leader == row.joint)
+        return tuple(row.joint for row in self.rows if row.sigma < 2 and row.mimicked_joint == row.joint)
 
     @property
     def roundings(self) -> float:
@@ -136,7 +137,7 @@ class TreeParameters:
         values = np.zeros((*q.shape[:-1], len(self.rows)))
         for j, row in enumerate(self.rows):
             if row.sigma < 2:
-                values[..., j] = row.multiplier * q[..., column[row.leader]] + row.offset
+                values[..., j] = row.multiplier * q[..., column[row.mimicked_joint]] + row.offset
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
@@ -271,7 +272,7 @@ def _make_row(
         beta=step.beta + 0.0,
         theta=clean_angle(step.phi_next + own_phi),
         r=clean_length(step.delta_next + own_delta, length),
-        leader=rule.leader if rule else joint.name,
+        mimicked_joint=rule.mimicked_joint if rule else joint.name,
         multiplier=rule.multiplier if rule else 1.0,
         offset=rule.offset if rule else 0.0,
     )
@@ -313,7 +314,11 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
     # The constant in a mimic joint's cell includes the offset of the mimic rule.
-    variable = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
+    variable = (
+        f"q({row.mimicked_joint})"
+        if row.mimicked_joint == row.joint
+        else f"{row.multiplier:.10g} q({row.mimicked_joint})"
+    )
     if row.sigma == 0:
         theta = format_sum(variable, units.format_angle(row.theta + row.offset))
     elif row.sigma == 1:

@@ -86,7 +86,9 @@ def _replace_unsafe_names(table: DHTable) -> DHTable:
     new = dict(zip(names, unique_safe_names(names), strict=True))
     rows = tuple(
         replace(
-            row, joint=new[row.joint], mimic=row.mimic and replace(row.mimic, leader=new[row.mimic.leader])
+            row,
+            joint=new[row.joint],
+            mimic=row.mimic and replace(row.mimic, mimicked_joint=new[row.mimic.mimicked_joint]),
         )
         for row in table.rows
     )

@@ -134,20 +134,20 @@ def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
     for joint in tree.joints:
         if (rule := joint.mimic) is None or (limit := joint.limit) is None:
             continue
-        own = ranges[rule.leader]
+        own = ranges[rule.mimicked_joint]
         if restrict_range(rule, limit, *own) != own:
-            limiting_joints.setdefault(rule.leader, []).append(joint.name)
-        allowed[rule.leader] = restrict_range(rule, limit, *allowed.get(rule.leader, own))
+            limiting_joints.setdefault(rule.mimicked_joint, []).append(joint.name)
+        allowed[rule.mimicked_joint] = restrict_range(rule, limit, *allowed.get(rule.mimicked_joint, own))
     return tuple(
         RangeReduction(
-            leader,
-            ranges[leader],
+            mimicked_joint,
+            ranges[mimicked_joint],
             ends if ends[0] < ends[1] else None,
-            tuple(limiting_joints[leader]),
-            "rad" if tree.joints[tree.joint_index(leader)].kind.turns else "m",
+            tuple(limiting_joints[mimicked_joint]),
+            "rad" if tree.joints[tree.joint_index(mimicked_joint)].kind.turns else "m",
         )
-        for leader, ends in allowed.items()
-        if leader in limiting_joints
+        for mimicked_joint, ends in allowed.items()
+        if mimicked_joint in limiting_joints
     )
 
 
@@ -158,8 +158,8 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     """
     least, most = _widen_limits(limit)
 
-    def is_allowed(leader: float) -> bool:
-        return least <= rule.multiplier * leader + rule.offset <= most
+    def is_allowed(mimicked_joint: float) -> bool:
+        return least <= rule.multiplier * mimicked_joint + rule.offset <= most
 
     if is_allowed(lower) and is_allowed(upper):
         return lower, upper
@@ -255,7 +255,8 @@ def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
 def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
+            f"it mimics {joint.mimic.mimicked_joint}: give that joint's value,"
+            " or load with mimic=False (--no-mimic)",
             QuestionsSection.MIMIC_JOINTS,
         )
         if joint.mimic
@@ -384,7 +385,7 @@ def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
     }
     for joint, words in _violations(tree, q):
         if joint.name not in impossible:
-            name = joint.mimic.leader if joint.mimic else joint.name
+            name = joint.mimic.mimicked_joint if joint.mimic else joint.name
             raise InputError(
                 "a joint is locked outside its limits",
                 where=tree.name,
@@ -595,16 +596,16 @@ def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
 
-def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> None:
+def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArray) -> None:
     rule = joint.mimic
     if rule is None or not values.size:
         return
-    off = rule.multiplier * leader + rule.offset - values
+    off = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
         off = np.arctan2(np.sin(off), np.cos(off))
     if np.abs(off).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
         raise InputError(
-            f"the mimic joint must be {rule.multiplier:g} * {rule.leader} + {rule.offset:g}",
+            f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"the value is off by {np.abs(off).max():.3g}",
             remedy="load with mimic=False to give it its own coordinate",

@@ -34,19 +34,19 @@ class Coupling:
     kinds: tuple[JointKind, ...]
 
     @cached_property
-    def _leaders(self) -> list[str]:
+    def _independent_joints(self) -> list[str]:
         pairs = zip(self.joints, self.mimics, strict=True)
-        return [mimic.leader if mimic else joint for joint, mimic in pairs]
+        return [mimic.mimicked_joint if mimic else joint for joint, mimic in pairs]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates, which are the independent joints, in path order."""
-        return tuple(dict.fromkeys(self._leaders))
+        return tuple(dict.fromkeys(self._independent_joints))
 
     @cached_property
     def matrix(self) -> FloatArray:
         G = np.zeros((len(self.joints), len(self.names)))
-        G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
+        G[np.arange(len(self.joints)), self._independent_index] = self._multiplier
         return freeze(G)
 
     @cached_property
@@ -60,7 +60,9 @@ class Coupling:
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
         own = tuple(map(units.get, self.names))
         hints = {
-            joint: Hint(f"it mimics {mimic.leader}: give that joint's value", QuestionsSection.MIMIC_JOINTS)
+            joint: Hint(
+                f"it mimics {mimic.mimicked_joint}: give that joint's value", QuestionsSection.MIMIC_JOINTS
+            )
             for joint, mimic, _ in rules
             if mimic
         }
@@ -71,7 +73,7 @@ class Coupling:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
         coordinates = self.parse(q, "q")
         # Each row of G contains only one number that is not zero, so no matrix product is needed.
-        return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
+        return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
         if (by_name := as_text_or_mapping(array, symbol)) is not None:
@@ -87,9 +89,9 @@ class Coupling:
         return values
 
     @cached_property
-    def _leader_index(self) -> list[int]:
+    def _independent_index(self) -> list[int]:
         column = {name: i for i, name in enumerate(self.names)}
-        return [column[leader] for leader in self._leaders]
+        return [column[mimicked_joint] for mimicked_joint in self._independent_joints]
 
     @cached_property
     def _multiplier(self) -> FloatArray:

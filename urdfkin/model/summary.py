@@ -84,7 +84,7 @@ def joint_cells(tree: KinematicTree, i: int) -> tuple[str, ...]:
     limits = ("", "", "") if limit is None else map(_limit_text, (limit.lower, limit.upper, limit.velocity))
     axis = format_axis(joint.axis.tolist()) if joint.kind.has_axis else ""
     rule = joint.mimic
-    mimics = format_mimic_rule(rule.leader, rule.multiplier, rule.offset) if rule else ""
+    mimics = format_mimic_rule(rule.mimicked_joint, rule.multiplier, rule.offset) if rule else ""
     return (joint.kind.value, axis, q, v, *limits, mimics)
 
 
@@ -104,13 +104,13 @@ def format_axis(axis: Sequence[float]) -> str:
     return " ".join(f"{x:.4g}" for x in axis)
 
 
-def format_mimic_rule(leader: str, factor: float, offset: float) -> str:
+def format_mimic_rule(mimicked_joint: str, factor: float, offset: float) -> str:
     """Return the mimic rule of a joint as text.
 
     >>> format_mimic_rule("thumb", 2.0, -0.1), format_mimic_rule("thumb", 1.0, 0.0)
     ('2 * thumb -0.1', 'thumb')
     """
-    return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
+    return (f"{factor:g} * " if factor != 1.0 else "") + mimicked_joint + (f" {offset:+g}" if offset else "")
 
 
 def _limit_text(value: float) -> str:

@@ -126,15 +126,18 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint: `multiplier * q_leader + offset`, where `leader` is not a mimic joint."""
+    """The rule of a mimic joint: multiplier * (value of the mimicked joint) + offset.
 
-    leader: str
+    The mimicked joint is not a mimic joint.
+    """
+
+    mimicked_joint: str
     multiplier: float
     offset: float
 
     def __str__(self) -> str:
         factor = {1.0: "", -1.0: "-"}.get(self.multiplier, f"{self.multiplier:g} ")
-        return f"{factor}{self.leader}" + (f" {self.offset:+g}" if self.offset else "")
+        return f"{factor}{self.mimicked_joint}" + (f" {self.offset:+g}" if self.offset else "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -269,12 +272,12 @@ class KinematicTree:
                 self._check_mimic(joint, joint.mimic)
 
     def _check_mimic(self, joint: Joint, mimic: Mimic) -> None:
-        leader = self.joints[self.joint_index(mimic.leader)]
-        if leader.mimic is not None or leader.kind.nq != 1 or joint.kind.nq != 1:
+        mimicked_joint = self.joints[self.joint_index(mimic.mimicked_joint)]
+        if mimicked_joint.mimic is not None or mimicked_joint.kind.nq != 1 or joint.kind.nq != 1:
             raise InputError(
                 "a joint with one coordinate can mimic only an independent joint with one coordinate",
                 where=f"joint {joint.name}",
-                found=f"{joint.kind.value} mimicking {leader.kind.value} {leader.name}",
+                found=f"{joint.kind.value} mimicking {mimicked_joint.kind.value} {mimicked_joint.name}",
             )
 
     # -- coordinates ---------------------------------------------------------------------------------
@@ -304,10 +307,11 @@ class KinematicTree:
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
         own = np.concatenate(([0], np.cumsum(sizes, dtype=int)))
-        leaders = (
-            self.joint_index(joint.mimic.leader) if joint.mimic else i for i, joint in enumerate(self.joints)
+        independent_joints = (
+            self.joint_index(joint.mimic.mimicked_joint) if joint.mimic else i
+            for i, joint in enumerate(self.joints)
         )
-        return tuple(int(own[i]) for i in leaders)
+        return tuple(int(own[i]) for i in independent_joints)
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
@@ -468,10 +472,10 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
     """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
-    leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
+    independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [
-        Lock(joint, values[leader]).make_fixed_joint() if leader in values else joint
-        for joint, leader in zip(tree.joints, leaders, strict=True)
+        Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint
+        for joint, mimicked_joint in zip(tree.joints, independent_joints, strict=True)
     ]
     return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)
 

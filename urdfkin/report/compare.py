@@ -111,7 +111,7 @@ def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None
 
 def _rule(joint: ReportedJoint) -> str:
     rule = joint["mimic"]
-    return format_mimic_rule(rule["leader"], rule["multiplier"], rule["offset"]) if rule else "none"
+    return format_mimic_rule(rule["mimicked_joint"], rule["multiplier"], rule["offset"]) if rule else "none"
 
 
 def _names(value: Any) -> str:

@@ -97,9 +97,13 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
     if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(errors) > _ROUNDED:
         yield f"{where}: its placement is not a rigid transform"
     if mimic is not None:
-        leader = next((other for other in joints if other["name"] == mimic["leader"]), None)
-        if leader is None or leader["mimic"] or not {joint["kind"], leader["kind"]} <= set(_WITH_AXIS):
-            yield f"{where}: it cannot mimic {mimic['leader']}"
+        mimicked_joint = next((other for other in joints if other["name"] == mimic["mimicked_joint"]), None)
+        if (
+            mimicked_joint is None
+            or mimicked_joint["mimic"]
+            or not {joint["kind"], mimicked_joint["kind"]} <= set(_WITH_AXIS)
+        ):
+            yield f"{where}: it cannot mimic {mimic['mimicked_joint']}"
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
@@ -111,7 +115,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
             places[joint["name"]] = (q, v) if nq else (None, None)
             q, v = q + nq, v + nv
     for joint in model["joints"]:
-        owner = joint["mimic"]["leader"] if joint["mimic"] else joint["name"]
+        owner = joint["mimic"]["mimicked_joint"] if joint["mimic"] else joint["name"]
         if places.get(owner) != (joint["q"], joint["v"]):
             yield f"`model`: joint {joint['name']}: wrong index in q or v"
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):

@@ -712,8 +712,8 @@ def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterato
         if np.abs(moved).max() > _MIMIC_ROUNDING * max(1.0, abs(rule.multiplier)):
             k = int(np.flatnonzero(np.abs(moved) > _MIMIC_ROUNDING)[0])
             yield (
-                f"joint {joint.name} mimics {rule.leader} with multiplier {rule.multiplier:g}; unwrapping"
-                f" {rule.leader} changes the value of {joint.name}, at sample {k} from"
+                f"joint {joint.name} mimics {rule.mimicked_joint} with multiplier {rule.multiplier:g};"
+                f" unwrapping {rule.mimicked_joint} changes the value of {joint.name}, at sample {k} from"
                 f" {rule.multiplier * q[k, at] + rule.offset:.4g} to"
                 f" {rule.multiplier * new[k, at] + rule.offset:.4g}"
             )

@@ -519,7 +519,7 @@ class _MjcfReader:
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is not a linear relation of two joints"
-            elif rule[0] in rules or depends_on(rules, rule[1].leader, rule[0]):
+            elif rule[0] in rules or depends_on(rules, rule[1].mimicked_joint, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a cycle"
             else:
                 rules[rule[0]] = rule[1]
@@ -560,16 +560,18 @@ def make_fixed_joint(name: str, T: FloatArray) -> Joint:
 def depends_on(rules: Mapping[str, Mimic], joint: str, other: str) -> bool:
     """Return whether the chain of mimicked joints that begins at `joint` contains `other`."""
     while joint in rules and joint != other:
-        joint = rules[joint].leader
+        joint = rules[joint].mimicked_joint
     return joint == other
 
 
 def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     """Combine a chain of mimic rules into one rule relative to an independent joint."""
     rule = rules[joint]
-    while rule.leader in rules:
-        end = rules[rule.leader]
-        rule = Mimic(end.leader, rule.multiplier * end.multiplier, rule.multiplier * end.offset + rule.offset)
+    while rule.mimicked_joint in rules:
+        end = rules[rule.mimicked_joint]
+        rule = Mimic(
+            end.mimicked_joint, rule.multiplier * end.multiplier, rule.multiplier * end.offset + rule.offset
+        )
     return rule
 
 

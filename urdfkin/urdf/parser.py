@@ -801,11 +801,11 @@ class JointReader:
         mimic = joint.element.find("mimic")
         if mimic is None:
             return
-        leader = self.read_required(mimic, "joint", '<mimic joint="..."/>')
+        mimicked_joint = self.read_required(mimic, "joint", '<mimic joint="..."/>')
         multiplier = self.numbers.read_scalar(mimic, "multiplier", 1.0)
         offset = self.numbers.read_scalar(mimic, "offset", 0.0)
-        if leader is not None and multiplier is not None and offset is not None:
-            joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
+        if mimicked_joint is not None and multiplier is not None and offset is not None:
+            joint.mimic = MimicRecord(mimic, mimicked_joint, multiplier, offset)
 
     def _check_unused_elements(self, joint: JointRecord) -> None:
         """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""

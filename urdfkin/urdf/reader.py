@@ -111,14 +111,14 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
         name, pending = start, dict[str, MimicRecord]()
         while name in rules and name not in resolved:
             rule = pending[name] = rules[name]
-            if rule.leader not in names:
+            if rule.mimicked_joint not in names:
                 where = f"joint {name} (mimic=False, --no-mimic, lets the joint move freely)"
-                raise UnknownNameError("mimicked joint", str(rule.leader), names, where=where)
-            if rule.leader in pending:
+                raise UnknownNameError("mimicked joint", str(rule.mimicked_joint), names, where=where)
+            if rule.mimicked_joint in pending:
                 raise InputError("mimic joints follow each other in a cycle", where=f"joint {start}")
-            name = rule.leader
+            name = rule.mimicked_joint
         end = resolved.get(name, Mimic(name, 1.0, 0.0))
         for name, rule in reversed(pending.items()):
             offset = rule.multiplier * end.offset + rule.offset
-            end = resolved[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+            end = resolved[name] = Mimic(end.mimicked_joint, rule.multiplier * end.multiplier, offset)
     return resolved

@@ -121,7 +121,7 @@ class LimitRecord:
 @dataclass(slots=True)
 class MimicRecord:
     element: Element
-    leader: str
+    mimicked_joint: str
     multiplier: float
     offset: float
 

@@ -1023,53 +1023,58 @@ class _StageReader:
         rules: dict[str, Mimic] = {}
         for edge in edges:
             for rule in self._read_mimic_rules(edge):
-                leader = by_path.get(rule.leader)
-                if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
-                    named = rule.leader or "nothing"
+                mimicked_joint = by_path.get(rule.mimicked_joint)
+                if (
+                    mimicked_joint is None
+                    or mimicked_joint.kind.nq != 1
+                    or edge.kind.nq != 1
+                    or mimicked_joint is edge
+                ):
+                    named = rule.mimicked_joint or "nothing"
                     what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
-                elif edge.path in rules or depends_on(rules, rule.leader, edge.path):
+                elif edge.path in rules or depends_on(rules, rule.mimicked_joint, edge.path):
                     what = "this joint has two mimic rules, or mimics itself through other joints"
                     self._report("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
         for path in rules:
             rule = resolve_rule(rules, path)
-            yield by_path[path].name, replace(rule, leader=by_path[rule.leader].name)
+            yield by_path[path].name, replace(rule, mimicked_joint=by_path[rule.mimicked_joint].name)
 
     def _read_mimic_rules(self, edge: _JointPrim) -> Iterator[Mimic]:
-        """Yield the mimic rules of a joint, in rad or m; `Mimic.leader` is a prim's path."""
+        """Yield the mimic rules of a joint, in rad or m; `Mimic.mimicked_joint` is a prim's path."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
             if self._read_value(prim, "newton:mimicEnabled") is False:
                 self._report("left-out-of-usd", edge.path, "the mimic rule of this joint is disabled")
                 return
-            leader = _target(prim, "newton:mimicJoint")
+            mimicked_joint = _target(prim, "newton:mimicJoint")
             c0, c1 = self._read_value(prim, "newton:mimicCoef0"), self._read_value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
-            self._compare_units(edge, leader)
-            yield Mimic(leader, multiplier, offset * own)
+            self._compare_units(edge, mimicked_joint)
+            yield Mimic(mimicked_joint, multiplier, offset * own)
             return
         for schema in schemas:
             base, _, freedom = schema.partition(":")
             if base != "PhysxMimicJointAPI":
                 continue
             prefix = f"physxMimicJoint:{freedom}"
-            leader = _target(prim, f"{prefix}:referenceJoint")
+            mimicked_joint = _target(prim, f"{prefix}:referenceJoint")
             gearing, offset = (
                 self._read_value(prim, f"{prefix}:gearing"),
                 self._read_value(prim, f"{prefix}:offset"),
             )
             multiplier = -1.0 if gearing is None else -float(gearing)
-            self._compare_units(edge, leader)
-            yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
+            self._compare_units(edge, mimicked_joint)
+            yield Mimic(mimicked_joint, multiplier, -float(offset or 0.0) * own)
 
     def _factor(self, kind: JointKind) -> float:
         return self._meters_per_unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
-    def _compare_units(self, edge: _JointPrim, leader: str) -> None:
-        kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
+    def _compare_units(self, edge: _JointPrim, mimicked_joint: str) -> None:
+        kind = next((one.kind for one in self._edges if one.path == mimicked_joint), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
             what = "USD defines no unit for mimic rules between an angle and a length; urdfkin uses m and rad"
             self._report("lost-mimic", edge.path, what, "compare the joint with the simulator")

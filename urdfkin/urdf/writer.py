@@ -53,8 +53,8 @@ def _write_joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
         yield '    <axis xyz="0 0 1"/>'
     yield from _write_limit(joint, joint.limit)
     if (rule := joint.mimic) is not None:
-        leader = escape_attribute(rule.leader)
-        yield f'    <mimic joint="{leader}" multiplier="{rule.multiplier!r}" offset="{rule.offset!r}"/>'
+        name = escape_attribute(rule.mimicked_joint)
+        yield f'    <mimic joint="{name}" multiplier="{rule.multiplier!r}" offset="{rule.offset!r}"/>'
     yield "  </joint>"
 
 

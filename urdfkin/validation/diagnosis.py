@@ -296,7 +296,7 @@ class Mistakes:
             for joint in mimics if moving else ():
                 assert joint.mimic is not None
                 rule = joint.mimic
-                value = rule.multiplier * x[:, own_names.index(rule.leader)]
+                value = rule.multiplier * x[:, own_names.index(rule.mimicked_joint)]
                 found[:, names.index(joint.name)] = value + (rule.offset if letter == "q" else 0.0)
             return found
 

@@ -31,9 +31,9 @@ class ReportedLimit(TypedDict):
 
 
 class ReportedMimic(TypedDict):
-    """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
+    """Mimic rule: the joint's value is multiplier * (value of `mimicked_joint`) + offset."""
 
-    leader: Annotated[str, doc("Name of the mimicked joint.")]
+    mimicked_joint: Annotated[str, doc("Name of the mimicked joint.")]
     multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
     offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
 

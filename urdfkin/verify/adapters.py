@@ -367,10 +367,10 @@ def read_newton(path: str) -> Reading:
     # If a body has no joint, Newton adds a free joint, which is not in the file.
     places = {
         str(label).rpartition("/")[2]: (int(start), int(count))
-        for label, kind, leader, start, count in zip(
+        for label, kind, mimicked_joint, start, count in zip(
             builder.joint_label, builder.joint_type, builder.joint_mimic_joint, starts, counts, strict=False
         )
-        if count and leader < 0 and int(kind) != int(newton.JointType.FREE)
+        if count and mimicked_joint < 0 and int(kind) != int(newton.JointType.FREE)
     }
     bodies = [str(label).rpartition("/")[2] for label in builder.body_label]
 

@@ -163,11 +163,11 @@ class MujocoOracle(Oracle):
     def _joint_indices(
         self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], locked: Mapping[str, float]
     ) -> Iterator[_MujocoIndices]:
-        leaders, q, v = dict[str, tuple[int, int]](), 0, 0
+        independent_joints, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             if joint.name and joint.name not in rules and joint.name not in locked:
                 nq, nv = _SIZES.get(joint.kind, (1, 1))
-                leaders[joint.name] = q, v
+                independent_joints[joint.name] = q, v
                 q, v = q + nq, v + nv
         for i, joint in enumerate(joints):
             if joint.kind == "fixed":
@@ -179,11 +179,13 @@ class MujocoOracle(Oracle):
                 yield _MujocoIndices(joint.kind, *indices, 0, -1, 0.0, locked[joint.name])
                 continue
             rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
-            if joint.name and rule.leader not in leaders:
+            if joint.name and rule.mimicked_joint not in independent_joints:
                 raise OracleError(
-                    "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
+                    "the mimicked joint does not exist",
+                    where=f"joint {joint.name}",
+                    found=rule.mimicked_joint,
                 )
-            ours = leaders.get(rule.leader, (-1, -1))
+            ours = independent_joints.get(rule.mimicked_joint, (-1, -1))
             yield _MujocoIndices(joint.kind, *indices, *ours, rule.multiplier, rule.offset)
 
     # -- quantities ----------------------------------------------------------------------------------

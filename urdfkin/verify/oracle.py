@@ -70,16 +70,16 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     known: dict[str, Mimic] = {}
     for joint in rules:
         chain = [joint]
-        while (leader := rules[chain[-1]].leader) in rules and leader not in known:
+        while (mimicked_joint := rules[chain[-1]].mimicked_joint) in rules and mimicked_joint not in known:
             # A longer chain contains a cycle.
             if len(chain) > len(rules):
                 break
-            chain.append(leader)
+            chain.append(mimicked_joint)
         for name in reversed(chain):
             rule = rules[name]
-            end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
+            end = known.get(rule.mimicked_joint, Mimic(rule.mimicked_joint, 1.0, 0.0))
             offset = rule.multiplier * end.offset + rule.offset
-            known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+            known[name] = Mimic(end.mimicked_joint, rule.multiplier * end.multiplier, offset)
     return {joint: known[joint] for joint in rules}
 
 
@@ -90,9 +90,9 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     {'a': 2.0, 'b': 1.25}
     """
     moved = {
-        name: rule.multiplier * lock[rule.leader] + rule.offset
+        name: rule.multiplier * lock[rule.mimicked_joint] + rule.offset
         for name, rule in rules.items()
-        if rule.leader in lock
+        if rule.mimicked_joint in lock
     }
     return {**lock, **moved}
 
@@ -135,12 +135,16 @@ class PinocchioLayout:
         self._joints = list[_JointIndices]()
         for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
-            if rule.leader not in at:
+            if rule.mimicked_joint not in at:
                 raise OracleError(
-                    "Pinocchio has no such mimicked joint", where=f"joint {name}", found=repr(rule.leader)
+                    "Pinocchio has no such mimicked joint",
+                    where=f"joint {name}",
+                    found=repr(rule.mimicked_joint),
                 )
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
-            self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
+            self._joints.append(
+                _JointIndices(size, *full, *at[rule.mimicked_joint], rule.multiplier, rule.offset)
+            )
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
         #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`; the factor is 0 for the base.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)

@@ -263,9 +263,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
             joints += 1
             tilt += joint.tilt
             reach += joint.length
-            factor, offset, leader = 1.0, 0.0, joint.name
+            factor, offset, mimicked_joint = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
-                factor, offset, leader = abs(rule.multiplier), abs(rule.offset), rule.leader
+                factor, offset, mimicked_joint = abs(rule.multiplier), abs(rule.offset), rule.mimicked_joint
             v_at, q_at = tree.v_index[i], tree.q_index[i]
             rates += factor * np.abs(samples.v[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
             accelerations += factor * np.abs(samples.a[:, v_at : v_at + joint.kind.nv]).sum(axis=-1)
@@ -274,8 +274,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 angles += value
             elif joint.kind.nq:
                 reach += value
-            if leader in names:
-                weights[joint.kind.turns][names.index(leader)] += factor
+            if mimicked_joint in names:
+                weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.

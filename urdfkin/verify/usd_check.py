@@ -219,8 +219,8 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
         if slides:
             length += largest_value(joint.limit)
         if joint.mimic is not None:
-            rule, leader = joint.mimic, tree.joints[tree.joint_index(joint.mimic.leader)]
-            off = share * (abs(rule.multiplier) * largest_value(leader.limit) + abs(rule.offset))
+            rule, mimicked_joint = joint.mimic, tree.joints[tree.joint_index(joint.mimic.mimicked_joint)]
+            off = share * (abs(rule.multiplier) * largest_value(mimicked_joint.limit) + abs(rule.offset))
             way, angle = (way + off, angle) if slides else (way, angle + off)
         parent_way, parent_angle = of_links[joint.parent]
         of_links[i + 1] = parent_way + way + (parent_angle + angle) * length, parent_angle + angle

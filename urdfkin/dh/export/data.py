@@ -94,7 +94,7 @@ def _value(value: Any) -> str:
 
 _CSV_COLUMNS = (
     *("joint", "kind", "sense", *COLUMNS, "beta"),
-    *("leader", "multiplier", "offset", "lower", "upper", "velocity", "effort"),
+    *("mimicked_joint", "multiplier", "offset", "lower", "upper", "velocity", "effort"),
 )
 
 
@@ -110,6 +110,6 @@ def write_csv(table: DHTable) -> str:
     writer.writeheader()
     for row in rows:
         flat = {**row, **row.pop("mimic", {}), **row.pop("limit", {})}
-        named = {key: csv_cell(flat[key]) for key in ("joint", "leader") if key in flat}
+        named = {key: csv_cell(flat[key]) for key in ("joint", "mimicked_joint") if key in flat}
         writer.writerow({key: value for key, value in (flat | named).items() if key in _CSV_COLUMNS})
     return out.getvalue()

@@ -48,8 +48,8 @@ def format_variable(
     number: Callable[[float], str] = "{:.10g}".format,
 ) -> str:
     """Return the joint's variable with its sign and its multiplier, for example q1, -q2 or 2 q1."""
-    leader = row.mimic.leader if row.mimic else row.joint
-    q = name.format(table.joint_names.index(leader) + 1)
+    mimicked_joint = row.mimic.mimicked_joint if row.mimic else row.joint
+    q = name.format(table.joint_names.index(mimicked_joint) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
@@ -301,7 +301,7 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
     for other in table.rows:
-        if other.joint == row.mimic.leader:
+        if other.joint == row.mimic.mimicked_joint:
             return max(map(abs, axis_range(other.kind, other.limit)))
     largest = max(map(abs, axis_range(row.kind, row.limit)))
     return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)

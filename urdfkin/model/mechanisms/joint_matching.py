@@ -537,7 +537,7 @@ class SubtreeMatcher:
         if not self._rules or not joints[0].kind.has_axis:
             return {}
         (x, m), (y, n) = (
-            (joint.name, 1.0) if (rule := joint.mimic) is None else (rule.leader, rule.multiplier)
+            (joint.name, 1.0) if (rule := joint.mimic) is None else (rule.mimicked_joint, rule.multiplier)
             for joint in joints
         )
         if not m or not n:

@@ -849,7 +849,7 @@ def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
 
 def _as_rule(joint: Joint) -> tuple[str, float, float]:
     rule = joint.mimic
-    return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
+    return (joint.name, 1.0, 0.0) if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:

@@ -688,7 +688,7 @@ class Variables:
     pairs: tuple[MatchedValues | None, ...]
     ranges: dict[str, tuple[float, float]]
     rules: tuple[int, ...]
-    leaders: dict[str, LinearFunction]
+    coordinates: dict[str, LinearFunction]
 
     def range(self, line: LinearFunction) -> tuple[float, float]:
         if not line.slope:
@@ -717,10 +717,10 @@ class _VariablesBuilder:
         self.alignment, self.tolerance = alignment, tolerance
         self.trees = alignment.a.tree, alignment.b.tree
         self.step_of_b = {step.b: step for step in alignment.steps}
-        self.leaders = self._leaders()
+        self.coordinates = self._find_coordinates()
         self.depth = alignment.depth
 
-    def _leaders(self) -> dict[str, LinearFunction]:
+    def _find_coordinates(self) -> dict[str, LinearFunction]:
         """Return each coordinate of B: a linear function of a coordinate of A, or a new variable."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
@@ -747,15 +747,17 @@ class _VariablesBuilder:
             return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
             return LinearFunction(f"a:{joint.name}", 1.0, 0.0)
-        return LinearFunction(f"a:{joint.mimic.leader}", joint.mimic.multiplier, joint.mimic.offset)
+        return LinearFunction(f"a:{joint.mimic.mimicked_joint}", joint.mimic.multiplier, joint.mimic.offset)
 
     def _value_b(self, step: MatchedJoints) -> LinearFunction:
         joint = self.trees[1].joints[step.b]
         if joint.kind is JointKind.FIXED:
             return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
-            return self.leaders[joint.name]
-        return self.leaders[joint.mimic.leader].compose(joint.mimic.multiplier, joint.mimic.offset)
+            return self.coordinates[joint.name]
+        return self.coordinates[joint.mimic.mimicked_joint].compose(
+            joint.mimic.multiplier, joint.mimic.offset
+        )
 
     def variables(self) -> Variables:
         pairs, rules = list[MatchedValues | None](), list[int]()
@@ -772,7 +774,7 @@ class _VariablesBuilder:
             elif not step.kind_difference:
                 rules.append(i)
             pairs.append(MatchedValues(a, b, b_unconverted, rounding))
-        return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.leaders)
+        return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.coordinates)
 
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.

@@ -156,7 +156,7 @@ def _effective_limits(joint: JointRecord) -> tuple[float | None, ...]:
 
 def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     rule = joint.mimic
-    return None if rule is None else (rule.leader, rule.multiplier, rule.offset)
+    return None if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
 #: Number of bytes in each line of git's binary patch.

@@ -34,7 +34,7 @@ CASES = [
     Case("xacro-expression-in-mesh", arm(base=MESH.format("$(arg side)/a.stl")), WARN, "URDF202:3"),
     Case("xacro-expression-in-material", arm(more='<material name="${c}"/>'), WARN, "URDF202:8"),
     Case("xacro-expression-in-robot", arm(robot='name="$(arg name)"'), WARN, "URDF202:2"),
-    Case("xacro-expression-in-leader", arm(follow='<mimic joint="${p}j1"/>'), REJECT, "URDF202:7"),
+    Case("xacro-expression-in-mimicked-joint", arm(follow='<mimic joint="${p}j1"/>'), REJECT, "URDF202:7"),
     Case("xacro-expressions-both", arm(base=MESH.format("${m}"), axis='<axis xyz="${a}"/>'), REJECT),
     Case("xacro-macro-in-link", arm(base='<link name="base"><xacro:mass m="1"/></link>'), WARN),
     Case("xacro-macro-in-joint", arm(inside="<xacro:origin/>"), REJECT, "URDF202:6"),

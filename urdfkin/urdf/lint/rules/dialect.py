@@ -309,7 +309,7 @@ _EXAMPLES = {
     "origin": '<origin xyz="0 0 1" rpy="0 0 0"/>',
     "axis": '<axis xyz="0 0 1"/>',
     "limit": '<limit lower="-1" upper="1" effort="10" velocity="1"/>',
-    "mimic": '<mimic joint="leader" multiplier="1" offset="0"/>',
+    "mimic": '<mimic joint="knuckle" multiplier="1" offset="0"/>',
     "parent": '<parent link="base"/>',
     "child": '<child link="arm"/>',
 }

@@ -314,7 +314,7 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
 
 MIMIC_UNKNOWN = Rule("URDF520", "mimic-unknown", ERROR)
 MIMIC_LOOP = Rule("URDF521", "mimic-loop", ERROR)
-MIMIC_LEADER = Rule("URDF522", "mimic-leader", ERROR)
+MIMICKED_JOINT = Rule("URDF522", "mimicked-joint", ERROR)
 MIMIC_CONSTANT = Rule("URDF523", "mimic-constant", WARNING)
 MIMIC_CONTINUOUS = Rule("URDF524", "mimic-continuous", WARNING)
 MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
@@ -369,30 +369,30 @@ class _MimicChecker:
             return
         if joint.kind in ("planar", "floating"):
             message = f"a {joint.kind} joint has several coordinates and cannot mimic another joint"
-            self.add(MIMIC_LEADER, message, mimic, "joint", "remove <mimic>")
+            self.add(MIMICKED_JOINT, message, mimic, "joint", "remove <mimic>")
             return
-        leader = self.joints.get(mimic.leader)
-        if leader is None:
+        mimicked_joint = self.joints.get(mimic.mimicked_joint)
+        if mimicked_joint is None:
             self.report_unknown(mimic)
         elif joint.name in self.in_loops:
-            itself = leader is joint
+            itself = mimicked_joint is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
-        elif leader.kind is not None and leader.kind not in AXIAL_TYPES:
-            count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
-            message = f"the mimicked joint is {leader.kind} and has {count}"
-            self.add(MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
+        elif mimicked_joint.kind is not None and mimicked_joint.kind not in AXIAL_TYPES:
+            count = "no coordinate" if mimicked_joint.kind == "fixed" else "several coordinates"
+            message = f"the mimicked joint is {mimicked_joint.kind} and has {count}"
+            self.add(MIMICKED_JOINT, message, mimic, "joint", "name a joint with one coordinate")
         else:
-            self.check_rule(joint, mimic, leader)
+            self.check_rule(joint, mimic, mimicked_joint)
 
     def report_unknown(self, mimic: MimicRecord) -> None:
-        nearest = self.report.nearest(mimic.leader, self.joints)
+        nearest = self.report.nearest(mimic.mimicked_joint, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
-    def check_rule(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
+    def check_rule(self, joint: JointRecord, mimic: MimicRecord, mimicked_joint: JointRecord) -> None:
         if mimic.multiplier == 0.0:
             message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
             remedy = "write a multiplier other than zero, or make the joint fixed"
@@ -404,8 +404,8 @@ class _MimicChecker:
         if joint.kind == "continuous":
             message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
-        if leader.mimic is not None:
-            message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
+        if mimicked_joint.mimic is not None:
+            message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
             remedy = "name the independent joint of the chain, because some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
@@ -415,9 +415,9 @@ class _MimicChecker:
         from urdfkin.model.configuration import format_range, restrict_range
         from urdfkin.model.tree import Limit
 
-        rule, leader = self.resolve_chain(mimic)
-        limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
-        if leader is None or moving is None or limits is None or joint.kind == "continuous":
+        rule, mimicked_joint = self.resolve_chain(mimic)
+        limits, moving = _range_of(joint), None if mimicked_joint is None else _range_of(mimicked_joint)
+        if mimicked_joint is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
         low, high = restrict_range(rule, bounds, *moving)
@@ -427,7 +427,9 @@ class _MimicChecker:
         # Rounding errors narrow a range of one value to an empty range.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
-        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {format_range(moving)}, "
+        message = (
+            f"the mimic joint leaves its limits: {mimicked_joint.name!r} moves from {format_range(moving)}, "
+        )
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
@@ -443,15 +445,15 @@ class _MimicChecker:
         """Return the combined rule of a mimic chain, and the last joint (None if missing or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
-        rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
-        leader = self.joints.get(rule.leader)
-        while leader is not None and (next_ := leader.mimic) is not None:
-            if leader.name in self.in_loops:
+        rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
+        mimicked_joint = self.joints.get(rule.mimicked_joint)
+        while mimicked_joint is not None and (next_ := mimicked_joint.mimic) is not None:
+            if mimicked_joint.name in self.in_loops:
                 return rule, None
             offset = rule.multiplier * next_.offset + rule.offset
-            rule = Mimic(next_.leader, rule.multiplier * next_.multiplier, offset)
-            leader = self.joints.get(rule.leader)
-        return rule, leader
+            rule = Mimic(next_.mimicked_joint, rule.multiplier * next_.multiplier, offset)
+            mimicked_joint = self.joints.get(rule.mimicked_joint)
+        return rule, mimicked_joint
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
@@ -474,7 +476,7 @@ def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
             visited.add(name)
             path[name] = len(path)
             rule = joints[name].mimic
-            name = None if rule is None else rule.leader
+            name = None if rule is None else rule.mimicked_joint
         if name is not None and name in path:
             in_loops |= {member for member, place in path.items() if place >= path[name]}
     return in_loops
