@@ -15,9 +15,9 @@ pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85
 np.set_printoptions(precision=3, suppress=True)
-print(f"columns: {', '.join(robot.rate_names)}")
+print(f"columns: {', '.join(robot.velocity_names)}")
 print(J)
 
-column = J[:, robot.rate_names.index("panda_joint4")]
+column = J[:, robot.velocity_names.index("panda_joint4")]
 print(f"1 rad/s of the elbow alone: {column[:3]} m/s and {column[3:]} rad/s")
 print(robot.certificate())

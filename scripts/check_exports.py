@@ -41,7 +41,7 @@ from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
 from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import code_of_robot
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 
 PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
@@ -93,7 +93,7 @@ def _largest(found: Sequence[float], count: int) -> float:
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield the tip frame of each robot, then other leaf links in a fixed random order."""
-    robots = {name: urdfkin.load(name) for name in examples()}
+    robots = {name: urdfkin.load(name) for name in example_robots()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
     frames = [
@@ -125,7 +125,7 @@ def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
     for line in wrong:
         print("WRONG", line)
     found = {(line["robot"], line["frame"]) for line in lines}
-    trees = {name: urdfkin.load(name).tree for name in examples()}
+    trees = {name: urdfkin.load(name).tree for name in example_robots()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
     counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
     others = f"{len(found - leaves)} tips that are not leaves"

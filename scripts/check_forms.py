@@ -36,11 +36,11 @@ from urdfkin.dh.convert import link_names, to_tree
 from urdfkin.dh.export.code import plain
 from urdfkin.errors import InputError
 from urdfkin.export import LANGUAGES
-from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.configuration import coordinate_names, sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
@@ -205,12 +205,14 @@ class Subject:
         """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # A table without lengths still has rounding errors of its angles.
-        allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
+        allowed = 2.0 * np.maximum(
+            self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
+        )
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
 
 
 def subjects(leaves: bool) -> Iterator[Subject]:
-    for name in examples():
+    for name in example_robots():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
         for tip in tips:

@@ -27,7 +27,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Load a robot",
         "`load` reads a robot; the class `Robot` has its names, joints, limits and all computations.",
         "load robots Robot name source path origin sha256 urdf joints joint_names link_names "
-        "link_frames frame_names all_frames frames tip_frame coordinate_names rate_names nq nv "
+        "link_frames frame_names all_frames frames tip_frame coordinate_names velocity_names nq nv "
         "root_joint limits velocity_limits view",
     ),
     "api/configurations.md": (

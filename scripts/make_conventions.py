@@ -27,7 +27,7 @@ import pinocchio as pin
 import urdfkin
 from scripts.pages import DOCS, inserted, table
 from urdfkin.model.conventions import Convention, find_convention
-from urdfkin.model.conventions.convention import _built_in, spelled
+from urdfkin.model.conventions.convention import _load_built_in, spell_name
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
@@ -366,7 +366,7 @@ def _cells(how: Convention) -> dict[str, str]:
     return {
         "order of joints": order,
         "names of joints": {"urdf": "those of the URDF", "usd": "USD, `1` is `tn__1_`"}.get(
-            how.names, f"identifiers, `1` is `{spelled('1', how.names)}`"
+            how.names, f"identifiers, `1` is `{spell_name('1', how.names)}`"
         ),
         "q of a continuous joint": "the angle" if how.continuous == 1 else "its cosine and sine",
         "unit of angles": how.angle,
@@ -375,8 +375,8 @@ def _cells(how: Convention) -> dict[str, str]:
         "v of a free body": f"{', '.join(v)}{', at the centre of mass' * (how.point != 'origin')}"
         if free
         else "not available",
-        "six-vector": "[linear; angular]" if how.six == "linear first" else "[angular; linear]",
-        "evidence": (f"measured: {how.measured}" if how.measured else how.evidence) + links,
+        "six-vector": "[linear; angular]" if how.six_vectors == "linear first" else "[angular; linear]",
+        "evidence": (f"measured: {how.measurement}" if how.measurement else how.evidence) + links,
     }
 
 
@@ -386,12 +386,12 @@ def measure() -> None:
     for name, library in LIBRARIES.items():
         package = _DISTRIBUTIONS.get(name, name)
         try:
-            line = f'measured = "{package} {metadata.version(package)}, {_measured(name, library)}"'
+            line = f'measurement = "{package} {metadata.version(package)}, {_measured(name, library)}"'
         except metadata.PackageNotFoundError:
             continue
         head, mark, rest = DATA.read_text("utf-8").partition(f"[{name}]\n")
         own, blank, others = rest.partition("\n\n")
-        own = re.sub(r"\nmeasured = .*", "", own).replace(
+        own = re.sub(r"\nmeasurement = .*", "", own).replace(
             'evidence = "measured"', f'evidence = "measured"\n{line}'
         )
         DATA.write_text(head + mark + own + blank + others, "utf-8")
@@ -430,5 +430,5 @@ def page() -> str:
 if __name__ == "__main__":
     if "--measure" in sys.argv[1:]:
         measure()
-        _built_in.cache_clear()
+        _load_built_in.cache_clear()
     PAGE.write_text(page(), "utf-8")

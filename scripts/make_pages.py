@@ -24,14 +24,14 @@ from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
-from urdfkin.kinematics.registry import table as equations
-from urdfkin.model.configuration import draw_base
+from urdfkin.kinematics.registry import equations_page
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, shortened
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, shorten
+from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
 from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, accuracy_study
@@ -68,14 +68,14 @@ REMARKS = {
 
 #: For each option of `check`: the limit that it raises, and its unit.
 LIMITS = {
-    "--max-bytes": (DEFAULT_LIMITS.bytes, "bytes"),
-    "--max-depth": (DEFAULT_LIMITS.depth, "levels of nesting"),
-    "--max-elements": (DEFAULT_LIMITS.elements, "elements"),
-    "--max-attributes": (DEFAULT_LIMITS.attributes, "attributes of one element"),
-    "--max-name": (DEFAULT_LIMITS.name, "characters of a name"),
-    "--max-number": (DEFAULT_LIMITS.number, "characters of a number"),
-    "--max-markup": (DEFAULT_LIMITS.markup, "bytes of one tag or comment"),
-    "": (WRITTEN_OUT, "complete findings of a kind, also in JSON and SARIF"),
+    "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
+    "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
+    "--max-elements": (DEFAULT_SIZE_LIMITS.elements, "elements"),
+    "--max-attributes": (DEFAULT_SIZE_LIMITS.attributes, "attributes of one element"),
+    "--max-name": (DEFAULT_SIZE_LIMITS.name, "characters of a name"),
+    "--max-number": (DEFAULT_SIZE_LIMITS.number, "characters of a number"),
+    "--max-markup": (DEFAULT_SIZE_LIMITS.markup, "bytes of one tag or comment"),
+    "": (MAX_COMPLETE_FINDINGS, "complete findings of a kind, also in JSON and SARIF"),
 }
 
 
@@ -90,8 +90,8 @@ def findings() -> dict[str, str]:
                 rule.id,
                 rule.slug,
                 rule.severity.value,
-                _cell(shortened(page_of(rule.id).title, 200)),
-                f"*{rule.oracle.value}*" if rule.oracle else "",
+                _cell(shorten(page_of(rule.id).title, 200)),
+                f"*{rule.pinocchio_reading.value}*" if rule.pinocchio_reading else "",
             )
             for rule in RULES.values()
             if rule.id[4] == digit
@@ -100,9 +100,11 @@ def findings() -> dict[str, str]:
         codes.append(f"### {family}\n\n{table(heads, rows)}\n")
     found = []
     for name, finding in ((one, finding) for one in catalogue() for finding in warnings_of(one)):
-        lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
+        lines = f"line {finding.line}" + (
+            f" and {len(finding.other_lines)} more" if finding.other_lines else ""
+        )
         what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-        found.append((name, finding.code, lines, _cell(shortened(what, 200)), REMARKS[finding.code]))
+        found.append((name, finding.code, lines, _cell(shorten(what, 200)), REMARKS[finding.code]))
     return {
         "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
         "codes": "\n".join(codes),
@@ -169,7 +171,7 @@ def study() -> dict[str, str]:
         for name, kind in STUDIED.items()
     }
     for name in MOVING:
-        base = draw_base(SAMPLES, np.random.default_rng([0, 1]))
+        base = draw_base_motion(SAMPLES, np.random.default_rng([0, 1]))
         studies[f"{name} on a moving base"] = accuracy_study(urdfkin.load(name), samples=SAMPLES, base=base)
     return study_parts(studies)
 
@@ -288,7 +290,7 @@ def path_of(name: str) -> Path:
 
 def page(name: str) -> str:
     if name == "equations":
-        return equations()
+        return equations_page()
     text = path_of(name).read_text("utf-8")
     if name == "performance":
         return tables.page(text, json.loads(FIGURES.read_text("utf-8")))

@@ -23,7 +23,7 @@ from urdfkin.kinematics.rotation import (
     quaternion_of,
     rotation_about,
     rotation_from_euler,
-    rotation_of,
+    rotation_from_quaternion,
     turning_vector_rate,
 )
 from urdfkin.view.figure import BLUE, GREEN, ORANGE, PURPLE, VERMILION
@@ -109,10 +109,10 @@ def integral_of_w(figure: Any) -> None:
             axes = figure.add_subplot(2, 3, 3 * row + column + 1, projection="3d")
             for axis in 1.25 * np.eye(3):
                 axes.quiver(0, 0, 0, *axis, color="#cfd6dd", arrow_length_ratio=0.06, linewidth=1)
-            for axis, color, name in zip(rotation_of(quats[step]).T, AXES, "xyz", strict=True):
+            for axis, color, name in zip(rotation_from_quaternion(quats[step]).T, AXES, "xyz", strict=True):
                 axes.quiver(0, 0, 0, *axis, color=color, arrow_length_ratio=0.12, linewidth=2.2)
                 axes.text(*(1.16 * axis), name, color=color, ha="center", va="center")
-            path = rotation_of(quats[: step + 1])[:, :, 2]
+            path = rotation_from_quaternion(quats[: step + 1])[:, :, 2]
             axes.plot(*path.T, color=BLUE, linewidth=1, linestyle=":")
             axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
             axes.set_box_aspect((1, 1, 1), zoom=1.35)
@@ -153,7 +153,7 @@ def convergence(figure: Any) -> None:
     errors = []
     for n in steps:
         quats = integrate_orientation(w, start, np.linspace(0.0, 2.0, n + 1))
-        errors.append(np.linalg.norm(log_rotation(rotation_of(quats[-1]).T @ end)))
+        errors.append(np.linalg.norm(log_rotation(rotation_from_quaternion(quats[-1]).T @ end)))
     axes = figure.subplots()
     axes.loglog(2.0 / steps, errors, "o-", color=BLUE, linewidth=2, label="error at t = 2 s")
     fourth = errors[-1] * (steps[-1] / steps) ** 4

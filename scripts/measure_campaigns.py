@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunking, run_chunk
 from urdfkin.validation.cluster import connect_cluster
@@ -109,5 +109,5 @@ if __name__ == "__main__":
     if given.chunk:
         measure_chunk()
     else:
-        robots = list(examples()) if given.all else given.robots
+        robots = list(example_robots()) if given.all else given.robots
         measure(robots, given.ways.split(","), given.samples, given.rounds)

@@ -9,7 +9,7 @@ from itertools import count
 
 import numpy as np
 
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 from urdfkin.model.tree import FloatArray
 
 _NEW = count()
@@ -77,7 +77,7 @@ class Counted:
 
 Vector = tuple[Counted, Counted, Counted]
 Matrix = tuple[Vector, Vector, Vector]
-eq = bound()
+eq = bind_equations()
 
 
 def matrix(R: FloatArray, *, fused: bool) -> Matrix:

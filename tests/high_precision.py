@@ -13,7 +13,7 @@ import numpy as np
 
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.recursion import State
+from urdfkin.model.recursion import LinkState
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import numbers
 from urdfkin.verify.exact.recursion import ExactMotion, move
@@ -92,12 +92,12 @@ def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None =
         return move(robot.tree, joints, *x, base=on)
 
 
-def root_state(base: BaseMotion) -> State:
+def root_state(base: BaseMotion) -> LinkState:
     """Return the state of the root link with this motion."""
     T, six, six_2 = base.placement, base.velocity, base.acceleration
     first, second, third = map(tuple, orthogonal_factor(T[:3, :3]).tolist())
     vectors: Any = (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])
-    return State((first, second, third), *(tuple(map(mp.mpf, vector)) for vector in vectors))
+    return LinkState((first, second, third), *(tuple(map(mp.mpf, vector)) for vector in vectors))
 
 
 def orthogonal_factor(M: FloatArray) -> Matrix:

@@ -60,7 +60,7 @@ def spoiled(inputs: list[FloatArray], samples: tuple[int, ...]) -> Iterator[tupl
 def test_nan_is_reported_at_each_position_of_a_batch(panda: Robot, method: str, verify: bool | str) -> None:
     count, compute = METHODS[method]
     inputs = list(state(panda, 2 * LANES + 3, 1)[:count])
-    names = panda.coordinate_names, panda.rate_names, panda.rate_names
+    names = panda.coordinate_names, panda.velocity_names, panda.velocity_names
     for which, coordinate, bad in spoiled(inputs, (0, LANES - 1, LANES, 2 * LANES + 2)):
         with pytest.raises(NotFiniteError, match=f"{'qva'[which]} must be finite") as caught:
             compute(panda, *inputs, verify=verify)
@@ -76,7 +76,7 @@ def test_nan_is_reported_at_each_position_of_a_single_configuration(panda: Robot
         for verify in (True, False):
             with pytest.raises(NotFiniteError, match=f"{'qva'[which]} must be finite") as caught:
                 compute(panda, *(x[0] for x in inputs), verify=verify)
-            assert caught.value.where == panda.rate_names[coordinate]
+            assert caught.value.where == panda.velocity_names[coordinate]
 
 
 @pytest.mark.parametrize("row", [0, 100, 2500, 4998, 4999])
@@ -97,7 +97,7 @@ def test_nan_is_reported_in_coordinates_of_planar_and_floating_joints(verify: bo
     robot = robot_of("planar_and_floating_in_the_middle")
     inputs = list(state(robot, 2, 4))
     for which, coordinate, _ in spoiled(inputs, (0, 1)):
-        name = (robot.rate_names if which else robot.coordinate_names)[coordinate]
+        name = (robot.velocity_names if which else robot.coordinate_names)[coordinate]
         # The error about a quaternion names only the joint.
         joint = name.split(".")[0]
         with pytest.raises(InputError, match=joint):

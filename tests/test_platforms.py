@@ -46,6 +46,6 @@ def test_the_address_space_is_limited_if_the_system_can(system: str, monkeypatch
     limits: dict[int, tuple[int, int]] = {}
     monkeypatch.setattr(resource, "setrlimit", limits.__setitem__)
     monkeypatch.setattr(sys, "platform", system)
-    confinement.limit(20)
+    confinement.limit_process(20)
     assert (resource.RLIMIT_AS in limits) == (system == "linux")
     assert limits.keys() >= {resource.RLIMIT_CPU, resource.RLIMIT_FSIZE, resource.RLIMIT_NPROC}

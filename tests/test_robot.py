@@ -25,6 +25,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.robot import _INTERNAL, Robot
+from urdfkin.robot.loading import as_robot
 from urdfkin.verify import verifier
 from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracle import QueryBatch
@@ -40,7 +41,7 @@ def panda() -> Robot:
 @pytest.fixture
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make all bounds smaller than rounding errors, so that correct results raise VerificationError."""
-    monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
+    monkeypatch.setattr(roundings, "PINOCCHIO_ROUNDINGS", 1e-9)
 
 
 HAND = "panda_hand"
@@ -285,6 +286,12 @@ def test_sources_of_every_kind_give_the_same_robot(panda: Robot, tmp_path: Path)
             assert (result == expected).all()
     with pytest.raises(InputError, match="found int"):
         urdfkin.load(3)  # type: ignore[arg-type]
+
+
+def test_a_robot_is_used_as_it_is_and_another_source_is_loaded(panda: Robot) -> None:
+    assert as_robot(panda) is panda
+    loaded = as_robot("panda")
+    assert (loaded.name, loaded.source, loaded.urdf) == (panda.name, panda.source, panda.urdf)
 
 
 def test_a_sample_is_within_limits_and_reproducible(panda: Robot) -> None:

@@ -19,7 +19,7 @@ from scripts.benchmarking import generated
 from scripts.benchmarking.subject import Subject, bare_urdf
 from scripts.benchmarking.timing import Calls, Work
 from urdfkin.compiled.plan import StepField
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 from urdfkin.model.tree import FloatArray
 
 ONE = "urdfkin, 1 thread"
@@ -372,7 +372,7 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
 
     jax.config.update("jax_enable_x64", True)  # All contenders compute in float64.
     array, plan = jnp.asarray, subject.plan
-    eq = bound(
+    eq = bind_equations(
         plus=lambda x, y: array(x) + array(y),
         minus=lambda x, y: array(x) - array(y),
         times=lambda c, x: c * array(x),

@@ -21,7 +21,7 @@ from scripts.benchmarking.timing import Work
 from urdfkin.compiled import python_numbers
 from urdfkin.compiled.plan import CompiledTree, JointMotion, StepField
 from urdfkin.kinematics import equations
-from urdfkin.model.recursion import Column, Recursion, State
+from urdfkin.model.recursion import Column, LinkState, Recursion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -44,20 +44,20 @@ def results(
 
     Each joint has one coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
-    recursion, state, columns = Recursion(eq, own=quantity == "acceleration"), State(), []
+    recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
         R, d = _pose(plan.geometry[i])
-        state = recursion.turned(recursion.carried(state, d), R)
+        state = recursion.rotate_frame(recursion.translate_frame(state, d), R)
         turns = JointMotion(kind) is JointMotion.TURN
         columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
         if turns:
             S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
-            state = recursion.revolute(state, _Z, S, v[i], a[i])
+            state = recursion.after_revolute(state, _Z, S, v[i], a[i])
         elif JointMotion(kind) is JointMotion.SLIDE:
-            state = recursion.prismatic(state, _Z, x[i], v[i], a[i])
+            state = recursion.after_prismatic(state, _Z, x[i], v[i], a[i])
         else:
             raise ValueError("a joint with more than one coordinate")
-    state = recursion.carried(state, _pose(plan.offsets[0])[1])
+    state = recursion.translate_frame(state, _pose(plan.offsets[0])[1])
     if quantity == "acceleration":
         return [*eq.rotate(state.R, state.acc), *eq.rotate(state.R, state.alpha)]
     J = recursion.jacobian(state, columns, plan.nv, Reference.LOCAL_WORLD_ALIGNED)

@@ -14,7 +14,7 @@ import numpy as np
 
 from urdfkin.compiled import outputs, recursion
 from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 
 #: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
 #: The reduction of the angle to r takes 10 operations. The computation of z = r^2, of 1 - z/2 and of their
@@ -86,7 +86,7 @@ class _Walk:
         x, zero, one, nothing = Number(), Number(0), Number(1), Number(nothing=True)
         triple = (x, x, x)
         self.names: dict[str, Any] = {
-            "eq": bound(),
+            "eq": bind_equations(),
             **{name: lambda *_: x for name in ("number", "number_if", "constant", "same")},
             **{name: lambda *_: triple for name in ("vector", "_vector", "_vector_if")},
             **{name: lambda *words: self.written.append(words[-1]) for name in ("put", "put_vector")},

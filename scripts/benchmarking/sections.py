@@ -26,7 +26,7 @@ from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.plan import WIDTH, Head, KernelProgram, Op, program_of
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -179,7 +179,7 @@ def cut(program: KernelProgram, parts: int) -> KernelProgram:
 
 
 def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> Work:
-    inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
+    inputs = [FIXED_BASE_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))
     staged = who == "writing results" and is_staged(out)
     task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)

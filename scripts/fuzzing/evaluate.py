@@ -103,7 +103,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         return Outcome("verified")
     # Unchecked results are acceptable only if a finding states why they are unchecked.
     for finding in findings:
-        if finding.oracle is not None:
+        if finding.pinocchio_reading is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)
     if (reason := robot.verifier.cannot()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)

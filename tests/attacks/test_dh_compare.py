@@ -17,7 +17,7 @@ from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import read_mapping, reference_path, table_of
 from urdfkin.dh.rows import last_digits
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import KinematicTree
 
 pytestmark = pytest.mark.long
@@ -119,7 +119,7 @@ def test_no_cell_of_a_nominal_table_has_a_far_larger_effect_than_the_tip_error(n
     nominal = dh_table(robot.tree, tip, base, snap=1e-4)
     strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
     assert max(abs(row.d) for row in strict.rows) > 100.0
-    found = compare(chain(to_tree(strict), tip, base), nominal)
+    found = compare(make_chain(to_tree(strict), tip, base), nominal)
     assert found.metres < 3e-3
     assert found.differences[0].tip <= 2.0 * found.metres
     assert found.residual <= 1e-9

@@ -22,10 +22,10 @@ from urdfkin.dh.snapping import noisy_cells
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.urdf.xacro import arguments_of
+from urdfkin.urdf.xacro import find_arguments
 from urdfkin.verify.tables import TableCheck, TableError
 
 #: A right angle with twelve digits, an error of 2.07e-13 rad; the parallel axes are 0.1 m apart.
@@ -158,7 +158,7 @@ def test_a_tilt_larger_than_rounding_gives_hayati_rows(tilt: float) -> None:
     table = dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
     q = np.random.default_rng(0).uniform(-3, 3, (50, 4))
-    assert np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max() <= 20 * EPS
+    assert np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max() <= 20 * EPS
 
 
 @pytest.mark.slow
@@ -233,10 +233,10 @@ def test_all_xacro_arguments_are_found_unless_an_include_is_computed_or_missing(
     def nowhere(package: str) -> str:
         raise LookupError(package)
 
-    assert arguments_of(xacro, nowhere) == {"length", "width", "colour"}
+    assert find_arguments(xacro, nowhere) == {"length", "width", "colour"}
     for file in ("$(arg width).xacro", "missing.xacro"):
         xacro.write_text(XACRO.replace("part.xacro", file))
-        assert arguments_of(xacro, nowhere) is None
+        assert find_arguments(xacro, nowhere) is None
 
 
 @pytest.mark.slow

@@ -145,7 +145,7 @@ def judged(data: bytes) -> None:
     findings = check_text(data, fold=False)
     if any(finding.severity is Severity.ERROR for finding in findings):
         return
-    marks = {finding.oracle for finding in findings} - {None}
+    marks = {finding.pinocchio_reading for finding in findings} - {None}
     model = read_by_pinocchio(data)
     if PinocchioReading.REFUSES in marks:
         assert model is None, (data, said(findings))

@@ -20,8 +20,8 @@ from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
+from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import accuracy_study
@@ -115,7 +115,7 @@ def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size
     robot.velocity(q[0], v[0], "b")
     assert robot.certificate().verified
     plan = robot.plan([1])
-    sizes = magnitudes(plan, q, v, None, STILL_STATE)
+    sizes = magnitudes(plan, q, v, None, FIXED_BASE_STATE)
     bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
     allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
     assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)
@@ -134,7 +134,7 @@ def test_a_position_whose_square_overflows_is_verified(size: float) -> None:
 def test_products_and_magnitudes_are_zero_only_if_a_factor_is_zero() -> None:
     x = np.array([0.0, 1e-200, 1e-200, 5e-324, 1.0, 0.0])
     y = np.array([1e-200, 1e-200, 1e-50, 5e-324, 2.0, 0.0])
-    assert product(x, y).tolist() == [0.0, SMALLEST, 1e-200 * 1e-50, SMALLEST, 2.0, 0.0]
+    assert product(x, y).tolist() == [0.0, SMALLEST_NORMAL, 1e-200 * 1e-50, SMALLEST_NORMAL, 2.0, 0.0]
     robot = urdfkin.load("panda")
     q = robot.neutral()
     robot.velocity(q, np.zeros(robot.nv), "panda_hand")

@@ -23,7 +23,7 @@ from tests.reading import tree_of
 from tests.urdf.lint.cases.arm import arm
 from urdfkin.errors import nearest
 from urdfkin.robot import Robot
-from urdfkin.urdf.findings import ERRORS_SHOWN, WRITTEN_OUT, Reporter
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, MAX_ERRORS_PER_CODE, Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check_text
 from urdfkin.urdf.lint.formats import as_json
 from urdfkin.urdf.parser import read_document
@@ -125,7 +125,7 @@ def test_a_number_with_too_many_characters_is_refused(xyz: str, code: str | None
     assert {finding.code for finding in findings} == ({code} if code else set())
 
 
-MANY = 3 * WRITTEN_OUT
+MANY = 3 * MAX_COMPLETE_FINDINGS
 DOUBLES = "<robot name='r'>" + "<link name='a'/>\n" * MANY + "</robot>"
 
 
@@ -136,7 +136,7 @@ def told(findings: list[Finding], code: str) -> int:
 @pytest.mark.long
 def test_many_errors_of_one_kind_are_summarised_also_by_load_and_hide_no_other_errors() -> None:
     findings = urdfkin.check(DOUBLES, fold=True)
-    assert len(findings) == ERRORS_SHOWN
+    assert len(findings) == MAX_ERRORS_PER_CODE
     assert told(findings, "URDF402") == MANY - 1
     assert f"(also on lines 102, 103, 104, 105 and {MANY - 105} more)" in str(findings[-1])
     assert sum(len(str(finding)) for finding in findings) < 50_000
@@ -153,12 +153,12 @@ def test_many_errors_of_one_kind_are_summarised_also_by_load_and_hide_no_other_e
 @pytest.mark.long
 def test_without_folding_findings_beyond_the_stated_number_are_listed_by_line() -> None:
     findings = urdfkin.check(DOUBLES)
-    assert len(findings) == WRITTEN_OUT
-    assert [finding.line for finding in findings] == list(range(2, WRITTEN_OUT + 2))
-    assert findings[-1].also == tuple(range(WRITTEN_OUT + 2, MANY + 1))
+    assert len(findings) == MAX_COMPLETE_FINDINGS
+    assert [finding.line for finding in findings] == list(range(2, MAX_COMPLETE_FINDINGS + 2))
+    assert findings[-1].other_lines == tuple(range(MAX_COMPLETE_FINDINGS + 2, MANY + 1))
     document = json.loads(as_json(findings, ["f"], "1"))
     assert document["counts"]["error"] == MANY - 1
-    assert document["findings"][-1]["also"][-1] == MANY
+    assert document["findings"][-1]["other_lines"][-1] == MANY
 
 
 def test_findings_of_one_kind_are_counted_with_the_lines_on_which_they_occur() -> None:

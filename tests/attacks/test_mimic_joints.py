@@ -19,7 +19,7 @@ from tests.urdfs import robot as robot_of
 from urdfkin.compiled.evaluate import placements
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.configuration import draw, narrowed_ranges
+from urdfkin.model.configuration import draw_samples, range_reductions
 from urdfkin.model.tree import without_mimic_rules
 from urdfkin.report.html import as_html
 from urdfkin.robot import Robot
@@ -217,7 +217,7 @@ def test_samples_keep_mimic_joints_within_their_limits(kind: str, offset: float,
 
 def test_a_validation_covers_the_whole_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
-    drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
+    drawn = draw_samples(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
     assert drawn[1:3].tolist() == [[-0.005], [0.055]]
     assert np.ptp(drawn[3:]) > 0.059
     assert np.ptp(robot.sample(2000)) <= 0.01
@@ -233,7 +233,7 @@ def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> 
     assert f"{own}; {allowed}" in robot._sheet().text()
     kept = [joint["remaining_range"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
-    (none,) = narrowed_ranges(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
+    (none,) = range_reductions(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
     assert str(none).endswith("at most one value keeps all its mimic joints within their limits (f1)")
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, VALIDATION.schema())

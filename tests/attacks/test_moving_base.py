@@ -13,9 +13,9 @@ from tests.urdfs import joint, robot
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation, nearest_rotation
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
 from urdfkin.model import base_motion as recursion_base
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
@@ -115,8 +115,8 @@ def test_only_a_rotated_base_counts_as_a_joint_in_the_bound() -> None:
     plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
-        (magnitudes(plan, q, None, None, state).roundings / ROUNDINGS).tolist()
-        for state in (STILL_STATE, BaseMotion(pose(p=[1.0, 2.0, 3.0])).state(()), turned.state(()))
+        (magnitudes(plan, q, None, None, state).roundings / PINOCCHIO_ROUNDINGS).tolist()
+        for state in (FIXED_BASE_STATE, BaseMotion(pose(p=[1.0, 2.0, 3.0])).state(()), turned.state(()))
     ]
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]
 

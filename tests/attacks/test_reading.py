@@ -83,7 +83,7 @@ def odd_file(kind: str, path: Path) -> Path:
         "a link to a device": lambda: path.symlink_to("/dev/zero"),
         "a pipe": lambda: os.mkfifo(path),
         "a folder": path.mkdir,
-        "a large file": lambda: path.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1)),
+        "a large file": lambda: path.write_bytes(bytes(xacro.MAX_SEARCHED_BYTES + 1)),
     }
     make.get(kind, int)()
     return Path("/dev/zero") if kind == "a device" else path

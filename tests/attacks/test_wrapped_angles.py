@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tests.cli import running
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as robot_of
-from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.rotation import rotation_from_quaternion
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory, read_trajectory
@@ -114,7 +114,7 @@ def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Pa
     np.testing.assert_allclose(motion.v[2:-2, 3:], np.tile(2.0 * axis, (len(t) - 4, 1)), atol=1e-3)
     np.testing.assert_allclose(motion.a[3:-3, 3:], 0.0, atol=1e-2)
     world = np.column_stack([-np.sin(t), np.cos(t), 0.0 * t])
-    own = np.einsum("nji,nj->ni", rotation_of(quaternion), world)
+    own = np.einsum("nji,nj->ni", rotation_from_quaternion(quaternion), world)
     np.testing.assert_allclose(motion.v[2:-2, :3], own[2:-2], atol=1e-3)
     assert any("quaternion changes its sign" in note for note in motion.notes)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.running import python
-from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import XacroError, expand
 
@@ -152,8 +152,16 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
+    message = refused(expanded, inside.replace('default=""', f'default="{secret}"'))
+    for words in (
+        "and the files and folders that an argument names",
+        "set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read",
+    ):
+        assert words in message
     assert SECRET in expanded(inside, file=str(secret))
-    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
+    fixed = '<xacro:arg name="folder" default=""/>' + link(f"${{xacro.load_yaml('{secret}')['password']}}")
+    refused(expanded, fixed)
+    assert SECRET in expanded(fixed, folder=str(secret.parent))
     inside = '<xacro:include filename="$(find neighbour)/secret.xacro"/>'
     assert "package 'neighbour' is not found" in refused(expanded, inside)
     refused(expanded, '<xacro:include filename="$(find etc)/passwd"/>')
@@ -188,16 +196,16 @@ def test_files_in_the_repository_may_be_read_unless_the_repository_is_the_home_f
     file, other = home / "robots" / "urdf" / "r.xacro", str(home / "robots" / "other" / "o.xacro")
     file.parent.mkdir(parents=True)
     file.touch()
-    assert not Ground.around(file, [], []).holds(other)
+    assert not AllowedPaths.of_file(file, [], []).allows(other)
     (home / "robots" / ".git").mkdir()
-    ground = Ground.around(file, [], [])
-    assert ground.holds(other)
+    allowed_paths = AllowedPaths.of_file(file, [], [])
+    assert allowed_paths.allows(other)
     for hidden_or_outside in ("robots/.git/config", "robots2/o.xacro"):
-        assert not ground.holds(str(home / hidden_or_outside))
+        assert not allowed_paths.allows(str(home / hidden_or_outside))
     monkeypatch.setenv("HOME", str(home))
     (home / "robots" / ".git").rename(home / ".git")
     for arguments in ([], ["/", str(home)]):
-        assert not Ground.around(file, [], arguments).holds(other)
+        assert not AllowedPaths.of_file(file, [], arguments).allows(other)
 
 
 def test_links_in_an_installed_package_may_only_lead_to_its_sources(tmp_path: Path) -> None:
@@ -211,11 +219,11 @@ def test_links_in_an_installed_package_may_only_lead_to_its_sources(tmp_path: Pa
     (installed / "secret.yaml").symlink_to(secret)
     (source / "secret.yaml").symlink_to(secret)
     (installed / "by-way.yaml").symlink_to(source / "secret.yaml")
-    ground = Ground.around(tmp_path / "robot" / "r.xacro", [str(tmp_path / "install")], [])
-    assert ground.holds(str(installed / "arm.xacro"))
-    assert not ground.holds(str(source / "arm.xacro"))
+    allowed_paths = AllowedPaths.of_file(tmp_path / "robot" / "r.xacro", [str(tmp_path / "install")], [])
+    assert allowed_paths.allows(str(installed / "arm.xacro"))
+    assert not allowed_paths.allows(str(source / "arm.xacro"))
     for other in ("secret.yaml", "by-way.yaml", "hidden", "../../../secret.yaml"):
-        assert not ground.holds(str(installed / other)), other
+        assert not allowed_paths.allows(str(installed / other)), other
 
 
 def test_links_in_a_repository_on_a_search_path_are_not_followed(
@@ -242,9 +250,9 @@ def test_a_xacro_file_reads_no_environment_variables(
 
 
 WORST = """
-from urdfkin.urdf.confinement import confine, limit
+from urdfkin.urdf.confinement import confine, limit_process
 import ctypes, os, socket, subprocess
-limit(20)
+limit_process(20)
 confine(lambda path: path == "/etc/hostname")
 {}
 """

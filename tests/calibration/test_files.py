@@ -27,8 +27,8 @@ from urdfkin.dh.rows import table_from_rows
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import euler_of, quaternion_of, rotation_from_rpy
-from urdfkin.model.chain import chain
-from urdfkin.model.path import elementary
+from urdfkin.model.chain import make_chain
+from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot.loading import load
 from urdfkin.system.files import Edit, edited
@@ -149,17 +149,19 @@ NOMINAL = (
 
 def drawn_in() -> list[FloatArray]:
     """Return the origins of the links, shifted along their axes as the driver does it."""
-    S = [elementary(2, True, theta) @ elementary(2, False, d) for theta, d, _, _ in CONTROLLER]
-    X = [elementary(0, False, a) @ elementary(0, True, alpha) for _, _, a, alpha in CONTROLLER]
+    S = [elementary_pose(2, True, theta) @ elementary_pose(2, False, d) for theta, d, _, _ in CONTROLLER]
+    X = [elementary_pose(0, False, a) @ elementary_pose(0, True, alpha) for _, _, a, alpha in CONTROLLER]
     for i in (1, 2):
         M = S[i] @ X[i]
         along = -M[2, 3] / M[2, 2]
         x, y, _ = M[:3, 3] + along * M[:3, 2]
         theta = math.atan2(-y, -x)
-        S[i] = elementary(2, True, theta)
-        X[i] = elementary(0, False, -math.hypot(x, y)) @ elementary(2, True, CONTROLLER[i, 0] - theta)
-        X[i] = X[i] @ elementary(0, True, CONTROLLER[i, 3])
-        S[i + 1] = S[i + 1] @ elementary(2, False, -along)
+        S[i] = elementary_pose(2, True, theta)
+        X[i] = elementary_pose(0, False, -math.hypot(x, y)) @ elementary_pose(
+            2, True, CONTROLLER[i, 0] - theta
+        )
+        X[i] = X[i] @ elementary_pose(0, True, CONTROLLER[i, 3])
+        S[i + 1] = S[i + 1] @ elementary_pose(2, False, -along)
     return [S[0], *(X[i] @ S[i + 1] for i in range(5))]
 
 
@@ -197,7 +199,7 @@ def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Pa
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
     true = controller().placement(q)
     driver, urdf = (
-        chain(make_calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
+        make_chain(make_calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
         for order in ("driver", "urdf")
     )
     assert np.abs(driver - true).max() < ROUNDING

@@ -10,7 +10,7 @@ from tests.calibration.arms import BRANCHED
 from urdfkin.calibration.parameters import CalibrationModel, make_table_model, make_urdf_model
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.kinematics import equations as eq
-from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import FloatArray, JointKind, inverse
 from urdfkin.robot.loading import load
@@ -89,7 +89,7 @@ def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fift
 
     def moved_joint(name: str, own: ExactJoint, moved: dict[int, Number]) -> ExactJoint:
         joint = robot.tree.joints[robot.tree.joint_index(name)]
-        A = matrix(axis_aligning(joint.axis)) if joint.kind.has_axis else IDENTITY
+        A = matrix(rotation_with_z_axis(joint.axis)) if joint.kind.has_axis else IDENTITY
         turned: Pose = A, ZERO
         R, p = joined((own.R, own.p), joined(joined(turned, six(model, name, moved)), back(turned)))
         gain = 1 + moved.get(numbers.get((name, "gain"), -1), 0)
@@ -119,7 +119,7 @@ def table(convention: DHConvention) -> DHTable:
         DHRow(0.0, 0.0, 0.1, 0.0, JointKind.CONTINUOUS, "four"),
     )
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = axis_aligning([0.6, 0.0, 0.8]), (0.1, 0.2, 0.3)
+    T[:3, :3], T[:3, 3] = rotation_with_z_axis([0.6, 0.0, 0.8]), (0.1, 0.2, 0.3)
     return DHTable(convention, rows, base=T, tool=inverse(T))
 
 

@@ -31,7 +31,7 @@ def test_a_result_equals_the_result_of_the_robot_in_the_convention(command: str,
     assert np.allclose(done.data["result"][0], expected, 0, 1e-12)
     assert np.allclose(done.data["q"][0], values["q"], 0, 1e-15)
     assert done.data["convention"] == name
-    assert tuple(done.data["rates"]) == other.rate_names
+    assert tuple(done.data["rates"]) == other.velocity_names
     assert done.data["rows"][0] == ("wx" if name == "drake" else "vx")
 
 
@@ -125,7 +125,7 @@ def test_order_prints_a_row_for_each_joint_and_a_column_for_each_convention() ->
         for row in table[1:]:
             q, _, v = row[k].partition("/")
             first = int((v or q).split("-")[0])
-            assert robot.convention(name).rate_names[first].split(".")[0] == row[0]
+            assert robot.convention(name).velocity_names[first].split(".")[0] == row[0]
 
 
 def test_tools_with_equal_indices_have_one_column_and_json_has_the_librarys_numbers() -> None:

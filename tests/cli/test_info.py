@@ -6,7 +6,7 @@ import pytest
 import urdfkin as library
 from tests.cli.running import good, refused, urdfkin
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.summary import guides
+from urdfkin.model.summary import tree_guides
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree
 from urdfkin.urdf.writer import to_urdf
 
@@ -44,13 +44,13 @@ def parents_of_the_drawing(lines: list[str]) -> list[int]:
 @pytest.mark.parametrize("name", ["forked", "panda", "talos"])
 def test_the_tree_drawing_shows_the_parent_of_each_link(name: str) -> None:
     tree = forked() if name == "forked" else library.load(name, verify=False).tree
-    drawn = [guide + "x" for guide in guides(tree)]
+    drawn = [guide + "x" for guide in tree_guides(tree)]
     assert parents_of_the_drawing(drawn) == [-1, *(one.parent for one in tree.joints)]
 
 
 def test_info_reports_the_first_joint_with_a_different_order_in_the_file() -> None:
     rows = [(joint(f"j{k}"), f"l{k}", f"l{k + 1}") for k in range(300)]
-    assert set(guides(build_tree("long", "l0", rows))) == {""}
+    assert set(tree_guides(build_tree("long", "l0", rows))) == {""}
     urdf = to_urdf(forked())
     assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
     swapped = urdf.replace('joint name="a"', 'joint name="z"')  # changes only urdfkin's order

@@ -15,7 +15,7 @@ from tests.cli.running import good, numbers, refused, urdfkin
 from urdfkin.cli import quantity
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.kinematics import rotation
-from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.kinematics.rotation import EULER_SEQUENCES
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 
@@ -86,7 +86,7 @@ def test_the_analytical_jacobian_equals_the_librarys_and_has_named_rows(represen
 
 
 def test_all_representations_are_known_and_a_singularity_is_reported_with_a_remedy() -> None:
-    assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
+    assert set(REPRESENTATIONS) == {"rpy", "quaternion", *EULER_SEQUENCES}
     err = refused("analytical-jacobian planar_two_link --q 0.3,0.4")
     assert "representational singularity" in err
     assert "another sequence or by a quaternion" in err

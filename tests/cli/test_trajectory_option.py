@@ -43,7 +43,7 @@ def log(motion: Motion, tmp_path: Path) -> Path:
 def write(path: Path, robot: Any, motion: Motion, time: str = "t") -> Path:
     """Write the arrays of a motion as CSV with the names of a robot or of a convention."""
     names = {"t": [time], "q": robot.coordinate_names}
-    names |= {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
+    names |= {x: [f"{x}:{name}" for name in robot.velocity_names] for x in "va"}
     heads = [name for x in motion for name in names[x]]
     rows = np.column_stack(list(motion.values())).tolist()
     path.write_text("\n".join([",".join(heads), *map(numbers, rows)]))
@@ -166,11 +166,11 @@ def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follow
     text = f"--q={numbers(mujoco.to(q)[0])}"
     found = run(*words, text, "--convention", "mujoco").data
     assert found["singular_values"] == plain["singular_values"]
-    order = mujoco.rate_permutation
+    order = mujoco.velocity_permutation
     assert order is not None
     expected = np.array(plain["manipulability_gradient"])[:, order]
     assert found["manipulability_gradient"] == expected.tolist()
-    assert (found["rates"], found["convention"]) == (list(mujoco.rate_names), "mujoco")
+    assert (found["rates"], found["convention"]) == (list(mujoco.velocity_names), "mujoco")
     assert "convention mujoco" in run(*words[:-2], text, "--convention", "mujoco").text.splitlines()[0]
 
 

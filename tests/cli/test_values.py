@@ -1,5 +1,6 @@
 """Commands read q, v and a in every form, and print results to the last digit in every format."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ def _is_number(cell: str) -> bool:
 def test_the_table_states_the_computed_result_and_the_closeness_of_the_check(quantity: str) -> None:
     text = command(quantity, 1, "local_world_aligned", "table").text
     words = ["panda", "panda_hand", "verified by Pinocchio 4", "eps*scale"]
-    words += library.load("panda").rate_names if quantity.startswith("jacobian") else []
+    words += library.load("panda").velocity_names if quantity.startswith("jacobian") else []
     assert [word for word in words if word not in text] == []
 
 
@@ -87,7 +88,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(line: str, colu
     line += " talos --frame gripper_left_base_link --q random:1"
     *lines, _ = urdfkin(line).text.splitlines()  # the last line states the check
     assert max(map(len, lines[2:])) <= columns  # the terminal wraps the text above the table
-    path = [name for name in library.load("talos").rate_names if name.startswith(("torso", "arm_left"))]
+    path = [name for name in library.load("talos").velocity_names if name.startswith(("torso", "arm_left"))]
     assert len(path) == 9
     assert set(path) <= {line.split()[0] for line in lines if line.split()}
     if line.startswith("jacobian"):
@@ -139,7 +140,7 @@ def test_the_json_result_contains_robot_frame_names_inputs_and_check() -> None:
     data = urdfkin("acceleration panda --q random --v random --a random --format json").data
     assert (data["robot"], data["frame"]) == ("panda", "panda_hand_tcp")
     assert data["reference"] == "local_world_aligned"
-    assert (data["coordinates"], data["rates"]) == (list(robot.coordinate_names), list(robot.rate_names))
+    assert (data["coordinates"], data["rates"]) == (list(robot.coordinate_names), list(robot.velocity_names))
     assert len(data["q"]) == len(data["v"]) == len(data["a"]) == len(data["result"]) == 1
     assert data["verified"] is True
     assert data["check"].startswith("verified by Pinocchio 4")
@@ -300,19 +301,64 @@ def test_json_states_the_file_the_locked_joints_and_the_motion_of_the_base(words
         assert data["base_velocity"] == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
 
 
+#: Commands about a path; `dh --all` writes a list of documents.
+ABOUT_PATHS = (
+    "chain", "dh", "dh --all", "dh --tree", "screws", "structure",
+)  # fmt: skip
+LOCKS = "panda_joint1=0.3"
+
+
+@pytest.mark.parametrize("words", ABOUT_PATHS)
+def test_the_output_about_a_path_states_the_locked_joints(words: str) -> None:
+    command, *options = words.split()
+    line = (command, "panda", *options, "--lock", LOCKS, "--lock", "panda_finger_joint1=0.04")
+    found = urdfkin(*line, "--format", "json").data
+    for document in found if isinstance(found, list) else [found]:
+        assert document["lock"] == {"panda_joint1": 0.3, "panda_finger_joint1": 0.04}
+    expected = "locked: panda_joint1 at 0.3 rad, panda_finger_joint1 at 0.04 m"
+    assert expected in urdfkin(*line).text
+    assert "panda\\_joint1 at 0.3 rad" in urdfkin(*line, "--format", "markdown").text
+    free = urdfkin(command, "panda", *options, "--format", "json").data
+    assert all("lock" not in document for document in (free if isinstance(free, list) else [free]))
+    assert "locked" not in urdfkin(command, "panda", *options).text
+
+
+@pytest.mark.parametrize("command", ["dh", "screws"])
+def test_a_written_file_with_locked_joints_is_read_as_the_same_robot(command: str, tmp_path: Path) -> None:
+    path = tmp_path / "panda.json"
+    good(command, "panda", "--lock", LOCKS, "-o", str(path))
+    assert json.loads(path.read_text())["lock"] == {"panda_joint1": 0.3}
+    read, locked = library.load(path), library.load("panda", lock={"panda_joint1": 0.3})
+    q = locked.sample(1, 1)[0][:6]
+    tip = "panda_hand_tcp"
+    assert np.allclose(read.placement(q, tip), locked.placement([*q, 0.0], tip), 0, 1e-14)
+
+
+def test_a_comparison_with_a_published_table_states_the_locked_joints() -> None:
+    line = "dh panda --compare panda --lock panda_finger_joint1=0.04"
+    assert good(f"{line} --format json").data["lock"] == {"panda_finger_joint1": 0.04}
+    assert "locked: panda_finger_joint1 at 0.04 m" in good(line).text
+
+
+def test_a_table_with_a_locked_joint_is_derived_again() -> None:
+    table = good("dh robots/dh/ur5.toml --lock shoulder_pan_joint=0.3 --format json").data
+    assert table["rows"][0]["joint"] == "shoulder_lift_joint"
+    assert table["lock"] == {"shoulder_pan_joint": 0.3}
+
+
 def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     done = urdfkin("jacobian panda --lock panda_finger_joint1=40mm --q ready --format json")
     robot = library.load("panda", lock={"panda_finger_joint1": 0.04})
     assert done.code == 0, done.err
     assert done.data["result"] == [robot.jacobian("ready").tolist()]
-    assert done.data["rates"] == list(robot.rate_names)
+    assert done.data["rates"] == list(robot.velocity_names)
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
     found = urdfkin("placement panda", *words, "--q", "0.1,0.2", "--format", "json").data
     robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
     robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
-    replay = robot.origin.words.split()
+    replay = robot.origin.command_line.split()
     assert replay == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
     found = urdfkin("placement", *replay, "--q", "ready", "--format", "json").data
     assert found["result"] == [robot.placement("ready").tolist()]

@@ -29,7 +29,14 @@ from urdfkin.model.mechanisms.mechanism import (
     screw_motion,
     variables_of,
 )
-from urdfkin.model.mechanisms.upper_bound import FINE, Grid, curvature, point, relevant_joints, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import (
+    FINE_GRID,
+    Grid,
+    curvature,
+    point_support,
+    relevant_joints,
+    upper_bounds,
+)
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.same import configuration_text
 from urdfkin.robot import Robot
@@ -68,7 +75,7 @@ def test_the_interval_contains_the_result_of_a_global_search_at_fifty_digits(cas
 def test_a_support_function_is_a_close_upper_bound(seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid, p = Grid(16, 48), rng.standard_normal(3)
-    reach, points = point(grid, p), p[np.newaxis]
+    reach, points = point_support(grid, p), p[np.newaxis]
     for _ in range(3):
         axis = rng.standard_normal(3)
         screw = Screw(axis / np.linalg.norm(axis), rng.standard_normal(3))
@@ -80,10 +87,10 @@ def test_a_support_function_is_a_close_upper_bound(seed: int) -> None:
     u = rng.standard_normal((200, 3))
     u /= np.linalg.norm(u, axis=1)[:, np.newaxis]
     size = np.linalg.norm(points, axis=1).max()
-    slack = reach.at(u) - (points @ u.T).max(axis=0)
+    slack = reach.evaluate(u) - (points @ u.T).max(axis=0)
     assert (slack >= -1e-12).all()
     assert np.median(slack) <= 0.03 * size
-    assert reach.largest() >= size
+    assert reach.max_distance() >= size
 
 
 def test_a_frame_with_an_unlimited_translation_has_no_bound() -> None:
@@ -177,7 +184,7 @@ def test_a_prismatic_mimic_joint_is_bounded_together_with_the_mimicked_joint() -
         return built(first, second, joint("j3", "revolute", "fore", "tool", "", "0 1 0", limit()))
 
     search, frame = search_of(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
-    upper = upper_bounds(search.alignment, search.variables, frame, FINE)[0]
+    upper = upper_bounds(search.alignment, search.variables, frame, FINE_GRID)[0]
     attained = s * np.sqrt(2.0)
     assert search.largest_distances([frame])[0][0] == pytest.approx(attained, rel=0.01)
     # A proven bound is not below the attained distance, even if the target is.
@@ -231,7 +238,7 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
 def test_with_many_differences_the_upper_bound_is_tightened_close_to_the_lower_bound() -> None:
     search, frame = search_of(robot("panda"), present(changed("panda", "rounded")), "panda_hand_tcp")
     lower, _ = search.largest_distances([frame])[0]
-    upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE)
+    upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE_GRID)
     assert upper > 1.6 * lower
     assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
     assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"

@@ -2,8 +2,10 @@
 
 import copy
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +13,15 @@ import pytest
 
 import urdfkin
 from tests.comparison.pairs import written
+from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.bounds import tighten
-from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.certificate import Rounding, certificate, recheck
 from urdfkin.comparison.result import Sameness, Verdict
 from urdfkin.comparison.verdict import Comparator
+from urdfkin.dh.compare import TableComparison
+from urdfkin.dh.table import DHTable, SnapReport
+from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import variables_of
 from urdfkin.model.tree import FloatArray
@@ -283,15 +289,26 @@ def test_the_bound_on_rounding_states_the_travel_of_a_joint_without_limits() -> 
     robots = tilted_slide("0.6 0 0.8"), tilted_slide("0.6 0 0.8000000000000002")
     found = urdfkin.same(*robots)
     assert (found.verdict, found.unlimited) == (Verdict.SAME, ("slide",))
-    assert "; this result holds if joints without limits travel at most 10 m" in str(found)
+    assert f"; this result holds if joints without limits travel at most {ASSUMED_LIMIT:g} m" in str(found)
 
     def distance(travel: float) -> float:
         ends = [robot.placement([travel / 0.01], "tool")[:3, 3] for robot in robots]
         return float(np.linalg.norm(ends[1] - ends[0]))
 
     metres, radians = found.rounding
-    assert metres >= 10.0 * radians  # A tilt of the slide moves the tool at the end of the travel.
-    assert distance(10.0) <= metres < distance(1e6)
+    assert metres >= ASSUMED_LIMIT * radians  # A tilt of the slide moves the tool at the end of the travel.
+    assert distance(ASSUMED_LIMIT) <= metres < distance(1e6)
+
+
+@pytest.mark.parametrize("documented", [Sameness, Rounding, TableComparison, SnapReport, DHTable.unlimited])
+def test_each_class_with_a_bound_documents_the_assumed_travel(documented: object) -> None:
+    assert re.search(rf"\b{ASSUMED_LIMIT:g}\s+m\b", present(documented.__doc__))
+
+
+@pytest.mark.parametrize("page", ["same.md", "dh.md", "dh-at-work.md"])
+def test_each_page_about_bounds_states_the_assumed_travel(page: str) -> None:
+    text = (Path(__file__).parents[2] / "docs" / page).read_text(encoding="utf-8")
+    assert re.search(rf"\b(at most|within) {ASSUMED_LIMIT:g} m\b", text)
 
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])

@@ -63,7 +63,7 @@ def test_the_number_of_matches_does_not_exceed_the_bound_of_the_start_bodies(
 ) -> None:
     tried = _tried(monkeypatch, robot(name), other(name, what))
     assert tried
-    assert all(found.matched <= self._most_matches(base) for self, base, found in tried)
+    assert all(found.match_count <= self._most_matches(base) for self, base, found in tried)
 
 
 def test_start_bodies_that_cannot_improve_the_match_are_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,13 +193,13 @@ def telescope(names: str, x: float) -> Robot:
 
 def test_prismatic_joints_with_equal_names_are_not_reordered(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = list[tuple[str, ...]]()
-    taken = Mechanism.reordered
+    taken = Mechanism.reorder
 
-    def reordered(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
+    def reorder(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
         tried.append(tuple(names))
         return taken(mechanism, names)
 
-    monkeypatch.setattr(Mechanism, "reordered", reordered)
+    monkeypatch.setattr(Mechanism, "reorder", reorder)
     found = urdfkin.same(telescope("abcd", 0.0), telescope("abcd", 0.001), bounds=False)
     assert found.verdict is Verdict.DIFFERS
     assert tried == []

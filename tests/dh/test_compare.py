@@ -16,10 +16,11 @@ from tests.dh.arms import CONVENTIONS, arm, disguised, elbow, published, with_ce
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import TableComparison, compare, document
-from urdfkin.dh.convert import to_convention, to_tree
+from urdfkin.dh.convert import serial_tree, to_convention, to_tree
 from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.errors import InputError, RangeError
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
+from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.tree import FloatArray, KinematicTree, Limit
 
 pytestmark = pytest.mark.slow
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, convention: str) -> None:
-    path = chain(elbow(), "tip")
+    path = make_chain(elbow(), "tip")
     reference = to_convention(disguised(dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
     assert found.exact
@@ -45,19 +46,49 @@ def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, conve
 @pytest.mark.parametrize("kinds", ["PRRRRR", "RRPRRR", "RRRRRP", "RPRPRR"])
 def test_tables_with_prismatic_joints_are_fitted(kinds: str) -> None:
     tree = elbow(kinds)
-    found = compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
+    found = compare(make_chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
     assert found.exact
     assert found.differences == ()
 
 
 def test_the_proven_bound_names_prismatic_joints_without_limits() -> None:
     tree = elbow("PRRRRR")
-    endless, limit = chain(tree, "tip"), Limit(-0.3, 0.2, 1.0, 1.0)
+    endless, limit = make_chain(tree, "tip"), Limit(-0.3, 0.2, 1.0, 1.0)
     first, *others = endless.joints
     path = replace(endless, joints=(replace(first, limit=limit), *others))
     texts = [document(compare(one, dh_table(tree, "tip")), units_of()).text() for one in (path, endless)]
     assert "proven bound for all joint values within limits: " in texts[0]
-    assert "within limits, with j1 within 0.5 m of zero: " in texts[1]
+    assert "within limits, with j1 within 10 m of zero: " in texts[1]
+
+
+@pytest.mark.parametrize("limit", [None, Limit(0.0, 0.0, 1.0, 1.0)])
+def test_the_proven_bound_covers_the_assumed_travel_of_a_joint_without_a_range(limit: Limit | None) -> None:
+    tree = elbow("RPRRRR")
+    first, second, *others = make_chain(tree, "tip").joints
+    path = replace(make_chain(tree, "tip"), joints=(first, replace(second, limit=limit), *others))
+    wrong = with_cells(dh_table(tree, "tip"), 0, alpha=dh_table(tree, "tip").rows[0].alpha + 1e-3)
+    found = compare(path, wrong, fit=False)
+    assert found.condition == f"j2 within {ASSUMED_LIMIT:g} m of zero"
+    values = np.zeros((2, 6))
+    values[:, 1] = -ASSUMED_LIMIT, ASSUMED_LIMIT
+    apart = path.placement(values)[:, :3, 3] - found.reference.placement(values)[:, :3, 3]
+    assert 0.009 < np.linalg.norm(apart, axis=-1).max() <= found.most_metres
+
+
+def test_rounding_at_the_assumed_travel_is_no_difference_on_a_path_of_millimetres() -> None:
+    """The displacement of j6 is up to 10 m, so its rounding error exceeds that of the path's lengths."""
+    tree = elbow("RRRRRP")
+    joints = [replace(joint, T_parent_joint=shrunk(joint.T_parent_joint)) for joint in tree.joints]
+    small = serial_tree("arm", tree.links, joints)
+    found = compare(make_chain(small, "tip"), dh_table(small, "tip"))
+    assert found.as_written
+    assert found.exact
+    assert found.written_metres > found.rounding * found.reach
+
+
+def shrunk(T: FloatArray) -> FloatArray:
+    """Return a pose whose translation is a thousand times shorter."""
+    return np.vstack([np.hstack([T[:3, :3], T[:3, 3:] / 1000.0]), T[3:]])
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -71,7 +102,7 @@ def test_an_arm_with_many_coinciding_axes_agrees_with_an_equivalent_table(seed: 
         rotation("z", -math.pi / 2) @ shift(0.13, 0, 0) @ rotation("x", 7.9e-5) @ shift(0, 0, 0.45),
         kinds="RRRPRR",
     )
-    assert compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), seed)).exact
+    assert compare(make_chain(tree, "tip"), disguised(dh_table(tree, "tip"), seed)).exact
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -88,14 +119,14 @@ def test_x_beside_a_prismatic_joint_is_perpendicular_to_both_axes(seed: int) -> 
         tip=rotation("z", math.pi / 2) @ shift(0.46, 0, 0.45) @ square @ half,
     )
     reference = disguised(dh_table(tree, "tip"), seed)
-    assert compare(chain(tree, "tip"), reference).exact
+    assert compare(make_chain(tree, "tip"), reference).exact
     assert dh_table(tree, "tip", like=reference).rows[3].alpha == pytest.approx(reference.rows[3].alpha)
 
 
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=20)
 def test_a_table_agrees_with_the_chain_of_the_derivation(tree: KinematicTree, seed: int) -> None:
-    path = chain(tree, "tip")
+    path = make_chain(tree, "tip")
     assume(path.reach > 1e-3)
     found = compare(path, disguised(dh_table(tree, "tip"), seed))
     assert found.metres <= 1e-11 * max(found.reference.span, 1.0)
@@ -113,7 +144,7 @@ WRONG = [pytest.param(*one, marks=() if one in FEW else pytest.mark.long) for on
 def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
     wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 2e-3})
-    found = compare(chain(elbow(), "tip"), disguised(wrong, 1))
+    found = compare(make_chain(elbow(), "tip"), disguised(wrong, 1))
     assert not found.agrees
     assert found.residual <= 1e-12
     named = [(one.row, one.cell) for one in found.differences]
@@ -128,12 +159,12 @@ def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -
 def test_a_cell_that_the_fitted_base_or_tool_compensates_is_no_difference(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
     other = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 0.1})
-    assert compare(chain(elbow(), "tip"), other).exact
+    assert compare(make_chain(elbow(), "tip"), other).exact
 
 
 def test_a_table_of_a_different_robot_differs() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
-    found = compare(chain(elbow(), "tip"), other)
+    found = compare(make_chain(elbow(), "tip"), other)
     assert not found.agrees
     assert "DIFFERS" in document(found, units_of()).text()
 
@@ -141,13 +172,13 @@ def test_a_table_of_a_different_robot_differs() -> None:
 def test_a_table_with_different_joints_is_refused() -> None:
     words = "found RRR in the table, RRRRRR in the URDF; choose a base and a tip"
     with pytest.raises(InputError, match=words):
-        compare(chain(elbow(), "tip"), table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 3, "standard"))
+        compare(make_chain(elbow(), "tip"), table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 3, "standard"))
 
 
 def test_the_text_of_a_comparison_states_row_cell_and_millimetres() -> None:
     table = dh_table(elbow(), "tip")
     wrong = with_cells(table, 2, a=table.rows[2].a + 3e-4)
-    text = document(compare(chain(elbow(), "tip"), wrong), units_of("degrees", "millimetres")).text()
+    text = document(compare(make_chain(elbow(), "tip"), wrong), units_of("degrees", "millimetres")).text()
     assert "Cells that differ (mm, deg)" in text
     rows = [line.split() for line in text.splitlines()]
     assert any(row[:3] == ["3", "j3", "a"] and row[-2:] == ["-0.3", "0.3"] for row in rows)
@@ -157,13 +188,13 @@ def test_the_text_of_a_comparison_states_row_cell_and_millimetres() -> None:
 @pytest.mark.parametrize("size", [1e155, -1e307])
 def test_a_length_whose_square_overflows_is_refused(size: float, cell: str) -> None:
     with pytest.raises(RangeError, match=f"row 3, {cell}"):
-        compare(chain(elbow(), "tip"), with_cells(dh_table(elbow(), "tip"), 2, **{cell: size}))
+        compare(make_chain(elbow(), "tip"), with_cells(dh_table(elbow(), "tip"), 2, **{cell: size}))
 
 
 def test_a_path_whose_square_overflows_is_refused() -> None:
     table = dh_table(elbow(), "tip")
     with pytest.raises(RangeError, match="square of this length"):
-        compare(chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)
+        compare(make_chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)
 
 
 # -- axes that nearly coincide -------------------------------------------------------------------------
@@ -203,7 +234,7 @@ def test_the_table_of_a_urdf_agrees_exactly_even_with_nearly_coincident_axes(
 ) -> None:
     tree = nearly_coincident(seed)
     reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
-    found = compare(chain(tree, "tip"), reference)
+    found = compare(make_chain(tree, "tip"), reference)
     assert found.exact
     assert found.differences == ()
 
@@ -216,7 +247,7 @@ def test_a_wrong_cell_beside_nearly_coincident_axes_is_detected(seed: int) -> No
     tree = arm(*steps, shift(0.02, -0.2, 0.1) @ square, kinds="RRRRR", tip=shift(0.1, 0, 0.08))
     table = dh_table(tree, "tip")
     wrong = with_cells(table, 1, a=table.rows[1].a + 1e-3)
-    found = compare(chain(tree, "tip"), disguised(wrong, seed))
+    found = compare(make_chain(tree, "tip"), disguised(wrong, seed))
     assert not found.agrees
     assert 5e-4 < found.metres < 2e-3
 
@@ -310,7 +341,7 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     rows = [[0.1, 0.5, 0.3, 0.0], [0.2, 0.0, 0.05, 0.0], [0.15, 0.9, 0.05, 0.0], [0.1, 0.4, 0.1, 0.0]]
     wrong = table_from_rows(rows, "standard")
     right = with_cells(wrong, 1, d=-0.05)  # along parallel axes, only the sum of the offsets matters
-    found = compare(chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
+    found = compare(make_chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
     assert "Each of these changes makes the table right without a fit:" in document(found, units_of()).text()

@@ -17,7 +17,7 @@ from urdfkin.dh import convert, dh_table, read_table, table_from_rows, to_conven
 from urdfkin.dh.parse_table import references
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.robot.loading import load
 from urdfkin.urdf import writer
@@ -56,7 +56,7 @@ def test_a_table_converted_to_a_tree_and_back_gives_the_same_tip_placement(
     robot = to_tree(table)
     tip = robot.links[robot.frame_link("tip")]
     q = configurations(robot.nq, 4)
-    path = chain(robot, tip)
+    path = make_chain(robot, tip)
     own = path.coupling.select(robot, q)
     assert set(path.joint_names) == set(table.joint_names)
     expected = table.placement(own[:, [path.joint_names.index(name) for name in table.joint_names]])
@@ -171,7 +171,7 @@ def test_a_table_file_can_be_loaded_like_a_urdf(tmp_path: Path, root_joint: str 
     np.testing.assert_array_equal(robot.jacobian(q, "tool0"), same.jacobian(q, "tool0"))
     assert robot.certificate().verified
     assert (robot.source, same.source) == (str(file), "<table>")
-    assert robot.origin.python.startswith(f"urdfkin.load({str(file)!r}")
+    assert robot.origin.python_call.startswith(f"urdfkin.load({str(file)!r}")
 
 
 def test_a_table_and_a_table_file_can_be_validated() -> None:

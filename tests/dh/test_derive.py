@@ -22,7 +22,7 @@ from urdfkin.dh.tree_parameters import as_csv, as_mapping, document, tree_parame
 from urdfkin.dh.units import Angles, Lengths, Units, fraction_text, pi_fraction, read_number, units_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import rotation_from_rpy
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 
 LENGTH_BOUND = 10.0
@@ -35,7 +35,7 @@ def reach_of(path: FrameChain) -> float:
 def demand_exact(table: DHTable, path: FrameChain) -> None:
     """Demand that the table's tip has the poses of the path's tip, up to rounding."""
     q = configurations(len(path.joint_names))
-    slack = 4 * EPS * (1 + sum(path.folded)) * reach_of(path)
+    slack = 4 * EPS * (1 + sum(path.pose_counts)) * reach_of(path)
     assert error_ratio(table, table.placement(q), path.placement(q), q, slack) <= 2.0
 
 
@@ -53,7 +53,10 @@ def test_the_tables_of_random_chains_are_exact_and_short(
     tree: Any, backwards: bool, convention: str, last: str, offset: str
 ) -> None:
     ends = ("l0", "tip") if backwards else ("tip", "l0")
-    path, table = chain(tree, *ends), dh_table(tree, *ends, convention, last=last, parallel_offset=offset)
+    path, table = (
+        make_chain(tree, *ends),
+        dh_table(tree, *ends, convention, last=last, parallel_offset=offset),
+    )
     demand_exact(table, path)
     demand_short(table, path)
 
@@ -68,7 +71,7 @@ def test_a_table_with_a_first_axis_close_to_the_x_axis_is_within_the_tolerance(
         T[:3, :3] = rotation_from_rpy([np.pi / 2, 0.0, np.pi / 2 + tilt * (1.0 + k * 1e-8)])
         tree = arm(T)
         for ends in (("tip", "l0"), ("l0", "tip")):
-            path, table = chain(tree, *ends), dh_table(tree, *ends, convention)
+            path, table = make_chain(tree, *ends), dh_table(tree, *ends, convention)
             q = configurations(1)
             off = np.abs(table.placement(q) - path.placement(q))[:, :3, :3].max(axis=(1, 2))
             assert (off <= table.tolerance(q)[1]).all()
@@ -122,7 +125,7 @@ def mp_shift(axis: int, length: Any) -> Any:
 @given(trees(min_joints=1, max_joints=5), st.sampled_from(CONVENTIONS))
 @settings(max_examples=30)
 def test_cells_are_accurate_to_a_few_units_in_the_last_place(tree: KinematicTree, convention: str) -> None:
-    path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
+    path, table = make_chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
     for q in configurations(len(path.joint_names), 3):
         values = path.coupling.values(q).tolist()
         error = exact_placement(table, values) - exact_chain(path, values)
@@ -137,7 +140,7 @@ def test_cells_are_accurate_to_a_few_units_in_the_last_place(tree: KinematicTree
 def test_axes_of_any_tilt_give_an_exact_and_short_table(power: int, convention: str) -> None:
     tilted = shift(0.4, 0.1, 0.05) @ rotation("x", 10.0**-power) @ rotation("y", 3.0 * 10.0**-power)
     tree = arm(rotation("x", 0.4) @ shift(0, 0, 0.3), tilted, tilted, rotation("x", 1.0), kinds="RRRR")
-    path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
+    path, table = make_chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
     demand_exact(table, path)
     demand_short(table, path)
 
@@ -166,7 +169,7 @@ def test_strict_rows_have_no_beta_and_are_exact_within_the_rounding_of_long_rows
     assert hayati.has_hayati_rows
     assert not strict.has_hayati_rows
     assert max(abs(row.d) for row in strict.rows) > 1e4
-    demand_exact(strict, chain(tree, "tip"))
+    demand_exact(strict, make_chain(tree, "tip"))
 
 
 def test_a_strict_table_with_a_prismatic_joint_beside_a_tilt_is_short() -> None:
@@ -176,7 +179,7 @@ def test_a_strict_table_with_a_prismatic_joint_beside_a_tilt_is_short() -> None:
         steps = steps if kinds != "RRP" else steps[2:] + steps[:2]
         tree = arm(*steps, kinds=kinds, tip=shift(0.1, 0.2, 0.3))
         table = dh_table(tree, "tip", near_parallel="strict")
-        demand_exact(table, chain(tree, "tip"))
+        demand_exact(table, make_chain(tree, "tip"))
         assert max(abs(row.d) for row in table.rows) < 1.0
         assert not table.has_hayati_rows
 
@@ -257,14 +260,14 @@ def test_the_axis_of_a_first_prismatic_joint_passes_through_the_origin_of_the_ba
 def test_the_axis_of_a_last_prismatic_joint_passes_through_the_tip_if_no_tool_remains() -> None:
     tree = arm(rotation("x", 1.0), rotation("x", 1.0) @ shift(0.1, 0, 0), kinds="RP", tip=shift(0, 0.2, 0.3))
     np.testing.assert_array_equal(dh_table(tree, "tip").tool, np.eye(4))
-    demand_exact(dh_table(tree, "tip"), chain(tree, "tip"))
+    demand_exact(dh_table(tree, "tip"), make_chain(tree, "tip"))
 
 
 def test_a_flipped_joint_has_sense_minus_one_and_the_same_coordinate() -> None:
     tree = arm(np.eye(4), rotation("x", 1.0) @ shift(0.3, 0, 0), tip=shift(0.2, 0, 0))
     table = dh_table(tree, "tip", flip=["j2"])
     assert [row.sense for row in table.rows] == [1, -1]
-    demand_exact(table, chain(tree, "tip"))
+    demand_exact(table, make_chain(tree, "tip"))
 
 
 def test_a_path_without_joints_is_a_table_without_rows() -> None:
@@ -284,7 +287,7 @@ def test_tables_with_prismatic_joints_at_any_position_are_exact(kinds: str) -> N
     tree = arm(*steps, kinds=kinds, tip=shift(0.1, 0.2, 0.3))
     for convention, strict in itertools.product(CONVENTIONS, ("hayati", "strict")):
         table = dh_table(tree, "tip", convention=convention, near_parallel=strict)
-        demand_exact(table, chain(tree, "tip"))
+        demand_exact(table, make_chain(tree, "tip"))
 
 
 # -- bad input -----------------------------------------------------------------------------------------
@@ -367,7 +370,11 @@ def test_units_are_selected_by_name() -> None:
 @given(trees(min_joints=1), st.sampled_from(CONVENTIONS))
 @settings(max_examples=40)
 def test_placement_jacobian_and_acceleration_agree_with_pinocchio(tree: Any, convention: str) -> None:
-    path, table, oracle = chain(tree, "tip"), dh_table(tree, "tip", convention=convention), TreeOracle(tree)
+    path, table, oracle = (
+        make_chain(tree, "tip"),
+        dh_table(tree, "tip", convention=convention),
+        TreeOracle(tree),
+    )
     columns = list(path.coupling.v_index(tree))
     q, v, a = (configurations(tree.nq, 3, seed) for seed in (0, 1, 2))
     q_own, v_own, a_own = (path.coupling.select(tree, array) for array in (q, v, a))

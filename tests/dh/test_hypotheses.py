@@ -18,7 +18,7 @@ from urdfkin.dh.compare import TOLERANCE, diagnose
 from urdfkin.dh.compare.hypotheses import other_interpretations, stated_interpretation, table_warnings
 from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.units import COLUMNS
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.robot.loading import load
 from urdfkin.urdf.findings import UrdfWarning
 
@@ -71,7 +71,9 @@ def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(nam
 @pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
 def test_wrong_units_are_named_for_an_arm_with_a_prismatic_joint(kinds: str) -> None:
     tree = elbow(kinds)
-    found = present(diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6))
+    found = present(
+        diagnose(make_chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6)
+    )
     assert found.interpretation.differences(found.stated) == "millimetres"
 
 

@@ -18,7 +18,7 @@ from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import screws_from, screws_of
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot.loading import load
 from urdfkin.verify.conversions import check_screws
@@ -54,7 +54,7 @@ def test_the_screws_of_the_books_ur5_give_the_placement_in_the_book() -> None:
 @given(trees(min_joints=1, max_joints=6, tame=True))
 @settings(max_examples=20)
 def test_space_and_body_screws_give_the_placements_of_the_chain(tree: KinematicTree) -> None:
-    path = chain(tree, "tip")
+    path = make_chain(tree, "tip")
     screws = screws_of(path)
     q = np.linspace(-1, 1, len(path.joint_names))
     values = path.coupling.values(q)

@@ -13,10 +13,14 @@ from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
+from urdfkin.dh.export import export
+from urdfkin.dh.export.text import printed
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
-from urdfkin.model.chain import chain
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.dh.units import Units
+from urdfkin.model.chain import make_chain
+from urdfkin.model.configuration import ASSUMED_LIMIT
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree
 
 
 def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) -> KinematicTree:
@@ -34,7 +38,7 @@ def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) 
 
 def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest position error and orientation error of the tip."""
-    exact, found = chain(tree, "tip").placement(q), table.placement(q)
+    exact, found = make_chain(tree, "tip").placement(q), table.placement(q)
     metres = np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1)
     return metres, rotation_angle(found[..., :3, :3], exact[..., :3, :3])
 
@@ -61,11 +65,11 @@ def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
 ) -> None:
     table = dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
-    own = chain(tree, "tip").coupling.select(tree, q)
+    own = make_chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
     allowed_metres, allowed_radians = table.tolerance(own)
     # Offsets that cancel are in no cell, but their sum has rounding errors.
-    rounding = 20 * EPS * (1 + len(tree.joints)) * chain(tree, "tip").lengths.sum()
+    rounding = 20 * EPS * (1 + len(tree.joints)) * make_chain(tree, "tip").lengths.sum()
     assert (metres <= allowed_metres + rounding).all()
     assert (radians <= allowed_radians).all()
 
@@ -146,13 +150,54 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
 
 
 @pytest.mark.parametrize(
-    ("limit", "travel"), [(None, 1.0), (Limit(-0.5, 3.0, 1.0, 1.0), 3.0), (Limit(-4.0, 3.0, 1.0, 1.0), 4.0)]
+    ("limit", "travel"),
+    [
+        (None, ASSUMED_LIMIT),
+        (Limit(-math.inf, 3.0, 1.0, 1.0), ASSUMED_LIMIT),
+        (Limit(-0.5, 3.0, 1.0, 1.0), 3.0),
+        (Limit(-4.0, 3.0, 1.0, 1.0), 4.0),
+    ],
 )
 def test_the_travel_of_a_prismatic_joint_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
     snap = present(dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
     assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
+    assert 0.0 < snap.measured_metres <= snap.metres
     assert snap.bound({"b": np.array([0.0, -5.0])}) == pytest.approx([2.0 * OFF, 7.0 * OFF], rel=1e-9)
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "sympy", "json", "toml"])
+def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without_limits(form: str) -> None:
+    endless, limited = (
+        export(dh_table(sliding(limit), "tip", snap=10 * OFF), form)
+        for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
+    )
+    condition = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
+    assert condition in " ".join(endless.split())
+    assert condition not in " ".join(limited.split())
+
+
+def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_without_limits() -> None:
+    endless, limited = (
+        printed(dh_table(sliding(limit, 0.1), "tip"), Units(digits=3))
+        for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
+    )
+    assert str(endless).endswith(f"m; this holds if joints without limits travel at most {ASSUMED_LIMIT:g} m")
+    assert "travel" not in str(limited)
+    assert limited.metres < endless.metres <= present(endless.bound)
+
+
+@pytest.mark.parametrize("base", ["base", "a"])
+def test_the_bound_of_printed_digits_covers_a_small_multiplier_of_a_mimic_rule(base: str) -> None:
+    # The printed multiplier has 10 digits. Its error is multiplied by the value of the mimicked joint.
+    rule, ahead = Mimic("big", 1.0 / 29.0, 0.0), shift(1.0, 0.0, 0.0)
+    joints = [
+        (z_joint("big", limit=Limit(-3.0, 3.0, 1.0, 1.0)), "base", "a"),
+        (z_joint("small", ahead, limit=Limit(-0.11, 0.11, 1.0, 1.0), mimic=rule), "a", "b"),
+        (z_joint("end", ahead, JointKind.FIXED), "b", "tip"),
+    ]
+    found = printed(dh_table(build_tree("arm", "base", joints), "tip", base), Units(digits=15))
+    assert 0.0 < found.metres <= present(found.bound)
 
 
 def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:
@@ -190,7 +235,7 @@ def test_the_row_of_a_constant_depends_on_the_convention(convention: str, row: i
 
 @pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
 def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, sliders: str) -> None:
-    path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
+    path = make_chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
     found = _change(path, pivot, "something", OFF)
     assert found.sliders == tuple(sliders.split())
     assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])

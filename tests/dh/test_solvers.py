@@ -19,7 +19,7 @@ from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import screws_of
 from urdfkin.dh.structure import Structure, opw_of, structure
 from urdfkin.errors import InputError
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -33,7 +33,7 @@ PUMA: list[list[float]] = [
 
 
 def of_tree(tree: KinematicTree) -> Structure:
-    return structure(screws_of(chain(tree, "tip")))
+    return structure(screws_of(make_chain(tree, "tip")))
 
 
 def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:
@@ -47,6 +47,40 @@ def test_a_puma_has_a_spherical_wrist_and_can_be_solved_by_opw() -> None:
     assert found.solvers[0].startswith("OPW")
     links = 0.4318 + math.hypot(0.0203, 0.15005) + 0.4318
     assert found.reached <= found.reach == pytest.approx(links, abs=0.02)
+
+
+FIRST_AXIS = "the point of the first axis that is nearest to the"
+
+
+@pytest.mark.parametrize(
+    ("kinds", "tilt", "point", "words"),
+    [
+        # The first axis is x = 2, y = 3. The second axis passes through (2.5, 3, 5) in the plane x = 2.5.
+        ("RR", H, (2.0, 3.0, 5.0), f"{FIRST_AXIS} second axis"),
+        ("RR", 0.03, (2.0, 3.0, 5.0), f"{FIRST_AXIS} second axis"),
+        ("RR", 0.0, (2.0, 3.0, 0.0), f"{FIRST_AXIS} base's origin"),
+        ("RR", 0.01, (2.0, 3.0, 0.0), f"{FIRST_AXIS} base's origin"),
+        ("RP", H, (2.0, 3.0, 0.0), f"{FIRST_AXIS} base's origin"),
+        ("R", 0.0, (2.0, 3.0, 0.0), f"{FIRST_AXIS} base's origin"),
+        ("PR", H, (0.0, 0.0, 0.0), "the base's origin"),
+        ("", 0.0, (0.0, 0.0, 0.0), "the base's origin"),
+    ],
+)
+def test_the_point_from_which_the_reach_is_measured_is_stated(
+    kinds: str, tilt: float, point: tuple[float, ...], words: str
+) -> None:
+    poses = [shift(2, 3, 1), shift(0.5, 0, 4) @ rotation("x", tilt)]
+    found = of_tree(arm(*poses[: len(kinds)], kinds=kinds, tip=shift(0.1, 0.2, 0.3)))
+    assert found.reach_from == pytest.approx(point, abs=1e-12)
+    assert found.reach_point == words
+    assert found.reached <= found.reach
+
+
+def test_the_command_states_the_point_from_which_the_reach_is_measured() -> None:
+    text, data = (good(f"structure planar_two_link --format {form}") for form in ("table", "json"))
+    assert f"measured from (0, 0, 0) m, {FIRST_AXIS} base's origin" in text.text
+    assert data.data["reach_from"] == [0.0, 0.0, 0.0]
+    assert data.data["reach_point"] == f"{FIRST_AXIS} base's origin"
 
 
 @pytest.mark.parametrize("offset", [1e-4, 3e-3])

@@ -18,7 +18,7 @@ from urdfkin.dh.compare import compare
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
 from urdfkin.errors import InputError
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot.loading import load
 
@@ -39,7 +39,7 @@ def test_a_table_like_an_equivalent_table_has_the_cells_of_that_table(seed: int,
             assert abs(off) < 1e-12, (i, name)
     assert table.rows[0].theta == reference.rows[0].theta
     q = configurations(6)
-    np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
+    np.testing.assert_allclose(table.placement(q), make_chain(tree, "tip").placement(q), atol=1e-13)
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_a_table_like_another_agrees_with_the_urdf_within_rounding(tree: Kinemat
         reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
         table = dh_table(tree, "tip", convention=convention, like=reference)
         q = np.linspace(-1, 1, len(table.rows))
-        apart = np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max()
+        apart = np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max()
         assert apart <= 20 * float(table.rounding(q)) + 1e-13
 
 
@@ -65,7 +65,7 @@ def test_the_zero_of_a_prismatic_joint_may_be_in_d_of_a_coaxial_revolute_joint(t
         assert (row.a, row.alpha, row.beta) == pytest.approx((other.a, other.alpha, other.beta))
     assert table.rows[2].d == reference.rows[2].d
     q = configurations(4)
-    np.testing.assert_allclose(table.placement(q), chain(tree, tip).placement(q), atol=1e-14)
+    np.testing.assert_allclose(table.placement(q), make_chain(tree, tip).placement(q), atol=1e-14)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_tables_with_craigs_first_row_and_minimal_prismatic_rows_are_exact(kinds
     table = dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
     assert (table.rows[0].d, table.rows[0].theta) == (0.0, 0.0)
     q = configurations(6)
-    np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
+    np.testing.assert_allclose(table.placement(q), make_chain(tree, "tip").placement(q), atol=1e-13)
 
 
 def test_a_minimal_prismatic_row_has_a_equal_to_zero() -> None:
@@ -212,7 +212,7 @@ def differences(table: DHTable, other: DHTable) -> dict[tuple[int, str], float]:
 
 def is_the_urdf(table: DHTable, tree: KinematicTree) -> bool:
     q = configurations(len(table.rows))
-    apart = np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max()
+    apart = np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max()
     return bool(apart <= 20.0 * np.max(table.rounding(q)) + 1e-13)
 
 
@@ -289,5 +289,5 @@ def test_a_changed_cell_without_a_difference_leaves_the_robot_the_same(
     i, cell = data.draw(st.sampled_from([one for one in cells if one[1] != "beta"]))
     changed = with_cells(reference, i, **{cell: getattr(reference.rows[i], cell) + CHANGE})
     if max(differences(dh_table(tree, "tip", like=changed), changed).values()) < 0.5 * CHANGE:
-        judged = compare(chain(tree, "tip"), changed)
+        judged = compare(make_chain(tree, "tip"), changed)
         assert judged.metres + judged.radians <= SAME

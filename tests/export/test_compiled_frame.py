@@ -16,7 +16,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import c, compiled_frame
 from urdfkin.export.code import exported
 from urdfkin.export.compiled_frame import NoCompilerError, library
-from urdfkin.model.tree import frozen
+from urdfkin.model.tree import freeze
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.quantities import quantity
@@ -125,7 +125,7 @@ def test_arrays_with_and_without_conversion_give_equal_results_and_errors() -> N
     for bad, to, words in (
         ((q, v, a), np.empty((n, 5)), "out must be"),
         ((q, v, a), np.empty((6, n)).T, "out must be"),
-        ((q, v, a), frozen(np.zeros((n, 6))), "out must be"),
+        ((q, v, a), freeze(np.zeros((n, 6))), "out must be"),
         ((shared[:n], v, a), shared[1 : n + 1], "share memory"),
         ((q[:, :5], v, a), out, "needs 6 numbers"),
         ((q[:5], v, a), out, "broadcast"),

@@ -253,9 +253,9 @@ def test_the_largest_roundings_of_exported_code_are_those_in_the_table(name: str
 @pytest.mark.long
 def test_the_roundings_of_a_joint_in_exported_code_are_within_the_count_of_the_bound() -> None:
     assert COUNTS["a constant of which something is left out"][1] < PARTS["Pinocchio's"][1]
-    assert COUNTS["a joint"][1] + PARTS["a joint of Pinocchio's"][1] <= roundings.ROUNDINGS
+    assert COUNTS["a joint"][1] + PARTS["a joint of Pinocchio's"][1] <= roundings.PINOCCHIO_ROUNDINGS
     own = most(deviation, lambda x: joint(x, fused=False))
-    assert math.hypot(own, most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
+    assert math.hypot(own, most(deviation, theirs)) < roundings.PINOCCHIO_ROUNDINGS / 9.0
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -22,7 +22,7 @@ from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.proof import CHECKED
 from urdfkin.kinematics import equations
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify.call import Call
@@ -120,7 +120,7 @@ def test_every_exported_quantity_agrees_with_pinocchio_within_the_bound(
 ) -> None:
     robot = robot_of(name)
     frame = robot.tip_frame
-    drawn = draw(robot.tree, 20, np.random.default_rng(3), with_special=True)
+    drawn = draw_samples(robot.tree, 20, np.random.default_rng(3), with_special=True)
     checker = copy(robot.verifier)
     for row in exported():
         inputs = (drawn.q, drawn.v, drawn.a)[: len(row.inputs)]

@@ -34,7 +34,7 @@ def test_no_step_is_longer_than_the_limit() -> None:
         steps.append(float(np.abs(step).max()))
         return x + step
 
-    found, _ = least_squares(np.array([-1.2, 1.0]), left_over, slopes, moved, longest=0.5)
+    found, _ = least_squares(np.array([-1.2, 1.0]), left_over, slopes, moved, max_step=0.5)
     assert max(steps) <= 0.5
     np.testing.assert_allclose(found, 1.0, atol=1e-12)
 

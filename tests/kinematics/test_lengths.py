@@ -13,13 +13,13 @@ from tests.strategies import rotations, trees
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import VECTORS
+from urdfkin.kinematics.arithmetic import VECTOR_OPERATIONS
 from urdfkin.kinematics.number_kinds import array_equations as on_vectors
-from urdfkin.kinematics.number_kinds import counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as on_lengths
-from urdfkin.kinematics.roundings import EPS, SMALLEST
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import draw
+from urdfkin.kinematics.number_kinds import magnitude, norm, product
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.bounds import magnitudes
 
@@ -28,7 +28,7 @@ EQUATIONS = sorted(
     name
     for name, value in vars(equations).items()
     if isinstance(value, FunctionType)
-    and name not in VECTORS
+    and name not in VECTOR_OPERATIONS
     and not name.startswith("about_")
     and name != "rotation_of_quaternion"
 )
@@ -59,7 +59,7 @@ def test_the_length_of_a_result_is_at_most_the_result_for_lengths(name: str, dat
         for x in parameters(name)
     }
     lengths = {
-        x: None if x == "R" else counted(np.asarray(value)) if np.ndim(value) == 0 else norm(value)
+        x: None if x == "R" else magnitude(np.asarray(value)) if np.ndim(value) == 0 else norm(value)
         for x, value in given.items()
     }
     with np.errstate(under="ignore"):
@@ -77,7 +77,9 @@ def test_longer_inputs_never_give_shorter_results(name: str, data: st.DataObject
     pairs = {x: sorted((data.draw(sizes), data.draw(sizes))) for x in parameters(name)}
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         shorter, longer = (
-            both(getattr(on_lengths, name)(**{x: counted(np.asarray(pair[i])) for x, pair in pairs.items()}))
+            both(
+                getattr(on_lengths, name)(**{x: magnitude(np.asarray(pair[i])) for x, pair in pairs.items()})
+            )
             for i in (0, 1)
         )
     assert all(a <= b for a, b in zip(shorter, longer, strict=True))
@@ -89,7 +91,7 @@ def test_a_product_of_lengths_is_at_least_the_smallest_normal_number_unless_a_fa
 ) -> None:
     with np.errstate(over="ignore", under="ignore"):
         xy = float(product(x, y))
-        assert xy == max(x * y, SMALLEST) if x and y else xy == 0.0
+        assert xy == max(x * y, SMALLEST_NORMAL) if x and y else xy == 0.0
 
 
 @pytest.mark.slow
@@ -99,9 +101,9 @@ def test_the_motion_of_any_link_of_any_tree_is_within_the_computed_magnitude(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:
     plan = compile_tree(tree, range(len(tree.links)))
-    samples = draw(tree, 5, np.random.default_rng(seed), with_special=True)
+    samples = draw_samples(tree, 5, np.random.default_rng(seed), with_special=True)
     q, v, a = samples.q, speed * samples.v, speed * samples.a
-    size = magnitudes(plan, q, v, a, STILL_STATE)
+    size = magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     vel, acc = velocities(plan, q, v), accelerations(plan, q, v, a)
 
     def exceeds(found: FloatArray, size: FloatArray) -> bool:

@@ -141,17 +141,17 @@ def test_the_table_of_roundings_is_sufficient_and_not_much_too_large(name: str) 
 def test_the_sum_of_all_roundings_of_a_joint_is_within_the_count() -> None:
     together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of Pinocchio's"][1]
     assert together == pytest.approx(22.5)
-    assert together < roundings.ROUNDINGS
-    assert math.hypot(most(deviation, ours), most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
+    assert together < roundings.PINOCCHIO_ROUNDINGS
+    assert math.hypot(most(deviation, ours), most(deviation, theirs)) < roundings.PINOCCHIO_ROUNDINGS / 9.0
     with_mujoco = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
-    assert with_mujoco + 1.5 < roundings.MUJOCO
+    assert with_mujoco + 1.5 < roundings.MUJOCO_ROUNDINGS
 
 
 def test_snapping_rounded_angles_changes_them_less_than_one_rotation_may_round() -> None:
     angles = [nearest_twelfth(k * math.pi / 12.0) for k in range(-11, 13)]
     rpy = np.array(list(itertools.product(angles[::2], angles[5:18], angles[::2])))
     for R in rotation_from_rpy(rpy):
-        assert rotation_angle(_round_rotation(R, 0.0), R) <= 0.25 * roundings.TURN * EPS
+        assert rotation_angle(_round_rotation(R, 0.0), R) <= 0.25 * roundings.ROTATION_ROUNDINGS * EPS
 
 
 def multiples_of_eps(tree: ast.AST) -> list[int]:

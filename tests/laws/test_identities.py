@@ -13,8 +13,8 @@ from urdfkin import VerificationError, load
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics import bodies
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import draw_base
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
@@ -131,7 +131,7 @@ def test_a_moving_base_gives_the_results_of_a_floating_root_joint(name: str) -> 
     robot, free = robot_of(name), robot_of(name, root_joint="floating")
     q, v, a = state(robot, 6, 8)
     generator = np.random.default_rng(9)
-    base = draw_base(6, generator)
+    base = draw_base_motion(6, generator)
     R, p = base.placement[:, :3, :3], base.placement[:, :3, 3]
     quaternion = Rotation.from_matrix(R).as_quat()
     spatial = base.acceleration.copy()
@@ -204,7 +204,7 @@ def test_the_acceleration_is_the_sum_of_the_terms_of_the_jacobian_and_of_the_jac
     generator = np.random.default_rng(5)
     q, (v, a) = robot.sample(4, 5), generator.normal(size=(2, 4, tree.nv))
     plan = robot.plan(range(len(tree.links)))
-    size = magnitudes(plan, q, v, a, STILL_STATE)
+    size = magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     for reference in Reference:
         J, J_rate = evaluate.jacobians(plan, q, reference), evaluate.jacobian_rates(plan, q, v, reference)
         total = np.einsum("nfij,nj->nfi", J, a) + np.einsum("nfij,nj->nfi", J_rate, v)
@@ -332,7 +332,7 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
 def test_an_error_in_a_relative_placement_is_found_and_reproducible(
     mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right: Any = bodies.seen_from
+    right: Any = bodies.relative_pose
 
     def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:
         T: FloatArray = right(T_a, T_b, out)
@@ -346,7 +346,7 @@ def test_an_error_in_a_relative_placement_is_found_and_reproducible(
 
     robot = urdfkin.load("ur5")
     q = robot.sample(1, seed=4)[0]
-    monkeypatch.setattr(bodies, "seen_from", wrong)
+    monkeypatch.setattr(bodies, "relative_pose", wrong)
     with pytest.raises(VerificationError, match="relative placement of tool0") as caught:
         robot.relative_placement(q, "tool0", "forearm_link")
     monkeypatch.undo()

@@ -14,7 +14,7 @@ from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import draw_base
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.oracle import free_flyer
 
@@ -31,7 +31,7 @@ WITH_MASSES = re.sub(r'<link name="(\w+)"/>', rf'<link name="\1">{_INERTIA}</lin
 
 
 def moving_base(n: int, seed: int) -> BaseMotion:
-    return draw_base(n, np.random.default_rng(seed))
+    return draw_base_motion(n, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("base", [None, moving_base(7, 1)])

@@ -23,7 +23,7 @@ from tests.urdfs import joint, limit, loaded, mimic
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
@@ -75,7 +75,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
     whole, part = (q[None], v, a), (q[None, of_q], v[:, of_v], a[:, of_v])
     frames = robot.link_frames
     plan = robot.plan([robot.tree.frame_link(frame) for frame in frames])
-    size = magnitudes(plan, *whole, STILL_STATE)
+    size = magnitudes(plan, *whole, FIXED_BASE_STATE)
     for row in recursive_quantities():
         for reference in row.references:
             inputs = [x[: len(row.inputs)] for x in (whole, part)]

@@ -14,7 +14,7 @@ from tests.laws.subjects import robot_of
 from tests.reading import present, tree_of
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import VECTORS
+from urdfkin.kinematics.arithmetic import VECTOR_OPERATIONS
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.accuracy import accuracy_study
@@ -25,13 +25,13 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 #: The relative change of a term.
 FACTOR = "1.0000000001"
 #: Upper limit of all bounds: 24 rounding errors for each of four factors and each of a dozen joints.
-WIDEST = 24.0 * 4 * 12
+ASSUMED_LIMIT = 24.0 * 4 * 12
 
 
 def terms() -> Iterator[tuple[str, str]]:
     """Yield (equation, term) for each vector in the last line of an equation."""
     for name, function in vars(equations).items():
-        if not inspect.isfunction(function) or name in VECTORS or name not in USED:
+        if not inspect.isfunction(function) or name in VECTOR_OPERATIONS or name not in USED:
             continue
         for node in ast.walk(ast.parse(inspect.getsource(function)).body[0]):
             if isinstance(node, ast.Call):
@@ -85,7 +85,7 @@ def test_a_relative_error_of_1e_10_in_any_term_of_an_equation_is_detected(
     robots: list[Robot], equation: str, term: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recursion._RECURSION, "eq", with_a_mistake(equation, term))
-    assert any(farthest(robot) > WIDEST for robot in robots)
+    assert any(farthest(robot) > ASSUMED_LIMIT for robot in robots)
 
 
 def robot_that_misreads(text: str, wrong: str) -> Robot:

@@ -13,8 +13,8 @@ from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
-from urdfkin.model.chain import chain
-from urdfkin.model.path import ElementaryMotion, Path, elementary
+from urdfkin.model.chain import make_chain
+from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, build_tree, pose
 from urdfkin.verify.conversions import check_chain
 from urdfkin.verify.oracle import QueryBatch
@@ -47,7 +47,7 @@ def test_the_placement_of_every_path_of_a_tree_agrees_with_pinocchio(tree: Kinem
     q = configurations(tree.nq, 4)
     ends = [tree.links[0], tree.links[-1], tree.links[len(tree.links) // 2]]
     for base, tip in itertools.product(ends, ends):
-        path = chain(tree, tip, base)
+        path = make_chain(tree, tip, base)
         scale = 1.0 + path.lengths.sum() + 10.0 * len(path.joints)
         found = path.placement(path.coupling.select(tree, q))
         error = np.abs(found - oracle.placement(q, tip, base)).max()
@@ -55,13 +55,13 @@ def test_the_placement_of_every_path_of_a_tree_agrees_with_pinocchio(tree: Kinem
 
 
 def test_a_path_through_the_common_ancestor_goes_up_and_then_down(walker: KinematicTree) -> None:
-    path = chain(walker, "right_shin", "left_foot")
+    path = make_chain(walker, "right_shin", "left_foot")
     assert [j.name for j in path.joints] == ["left_knee", "left_hip", "right_hip", "right_knee"]
     assert [j.backwards for j in path.joints] == [True, True, False, False]
 
 
 def test_a_joint_passed_backwards_has_a_reversed_axis_and_an_unchanged_sign(walker: KinematicTree) -> None:
-    there, back = chain(walker, "left_shin", "left_thigh"), chain(walker, "left_thigh", "left_shin")
+    there, back = make_chain(walker, "left_shin", "left_thigh"), make_chain(walker, "left_thigh", "left_shin")
     np.testing.assert_array_equal(there.axes(), [[0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(back.axes(), [[0.0, 0.0, -1.0]])
     np.testing.assert_allclose(there.placement([0.7]) @ back.placement([0.7]), np.eye(4), atol=4 * EPS)
@@ -71,7 +71,7 @@ def test_a_joint_passed_backwards_has_a_reversed_axis_and_an_unchanged_sign(walk
 @given(trees(min_joints=1))
 @settings(max_examples=50)
 def test_the_placement_of_a_reversed_chain_is_the_inverse(tree: KinematicTree) -> None:
-    there, back = chain(tree, "tip", "l0"), chain(tree, "l0", "tip")
+    there, back = make_chain(tree, "tip", "l0"), make_chain(tree, "l0", "tip")
     q = configurations(tree.nq, 4)
     T_there, T_back = (path.placement(path.coupling.select(tree, q)) for path in (there, back))
     scale = 1.0 + there.lengths.sum() + 10.0 * len(there.joints)
@@ -79,7 +79,7 @@ def test_the_placement_of_a_reversed_chain_is_the_inverse(tree: KinematicTree) -
 
 
 def test_a_mimicked_joint_outside_the_path_is_a_coordinate(walker: KinematicTree) -> None:
-    path = chain(walker, "right_shin", "pelvis")
+    path = make_chain(walker, "right_shin", "pelvis")
     assert path.joint_names == ("right_hip", "left_knee")
     assert path.coupling.values([0.1, 2.0]).tolist() == [0.1, -1.5 * 2.0 + 0.2]
     q = np.arange(1.0, walker.nq + 1)
@@ -89,7 +89,7 @@ def test_a_mimicked_joint_outside_the_path_is_a_coordinate(walker: KinematicTree
 
 
 def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
-    path = chain(walker, "left_foot")
+    path = make_chain(walker, "left_foot")
     named = path.placement({"left_knee": 0.4, "left_hip": 0.1})
     np.testing.assert_array_equal(named, path.placement([0.1, 0.4]))
     np.testing.assert_array_equal(path.placement("neutral, left_knee=0.4"), path.placement([0.0, 0.4]))
@@ -99,11 +99,11 @@ def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
 
 def test_a_missing_name_raises_an_error(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match=r"no value for left_hip; .*'neutral, left_knee=\.\.\.'"):
-        chain(walker, "left_foot").placement({"left_knee": 0.4})
+        make_chain(walker, "left_foot").placement({"left_knee": 0.4})
 
 
 def test_the_sum_of_interorigin_vectors_leads_from_the_first_joint_to_the_tip(walker: KinematicTree) -> None:
-    path = chain(walker, "left_foot", "right_thigh")
+    path = make_chain(walker, "left_foot", "right_thigh")
     q = configurations(len(path.joint_names), 5)
     total = path.origins(q)[:, 0] + path.interorigin(q).sum(axis=-2)
     np.testing.assert_allclose(total, path.placement(q)[:, :3, 3], atol=8 * EPS)
@@ -114,24 +114,24 @@ def test_the_sum_of_interorigin_vectors_leads_from_the_first_joint_to_the_tip(wa
 @given(trees())
 @settings(max_examples=50)
 def test_the_lengths_bound_the_distance_between_origins(tree: KinematicTree) -> None:
-    for path in (chain(tree, "tip"), chain(tree, "l0", "tip")):
+    for path in (make_chain(tree, "tip"), make_chain(tree, "l0", "tip")):
         distances = [np.linalg.norm(A[:3, 3]) for A in path.constants]
         assert (np.array(distances) <= path.lengths * (1 + 8 * EPS) + 1e-300).all()
 
 
 def test_the_error_about_a_path_over_a_floating_joint_contains_a_remedy(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match=r"joint float: a floating joint .*'balloon' outwards"):
-        chain(walker, "balloon", "pelvis")
-    assert chain(walker, "balloon", "balloon").joints == ()
+        make_chain(walker, "balloon", "pelvis")
+    assert make_chain(walker, "balloon", "balloon").joints == ()
 
 
 def test_the_error_about_a_wrong_number_of_coordinates_lists_the_expected_coordinates(
     walker: KinematicTree,
 ) -> None:
     with pytest.raises(InputError, match="left_hip, left_knee"):
-        chain(walker, "left_foot").placement(np.zeros(3))
+        make_chain(walker, "left_foot").placement(np.zeros(3))
     with pytest.raises(InputError, match="numbers for walker"):
-        chain(walker, "left_foot").coupling.select(walker, np.zeros(3))
+        make_chain(walker, "left_foot").coupling.select(walker, np.zeros(3))
 
 
 def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
@@ -184,14 +184,14 @@ AMOUNTS = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(MOTIONS)))
 def test_the_frames_of_a_path_are_products_of_the_elementary_motions() -> None:
     T, frames = np.broadcast_to(A, (4, 4, 4)), PATH.frames(AMOUNTS)
     for k, motion in enumerate(MOTIONS):
-        T = T @ elementary(motion.axis, motion.turns, AMOUNTS[:, k])
+        T = T @ elementary_pose(motion.axis, motion.turns, AMOUNTS[:, k])
         np.testing.assert_allclose(frames[:, 2 * k + 1], T, atol=1e-15)
         T = T @ A
         np.testing.assert_allclose(frames[:, 2 * k + 2], T, atol=1e-15)
 
 
 def test_the_jacobian_columns_of_a_path_are_difference_quotients() -> None:
-    poses, columns = PATH.columns(AMOUNTS)
+    poses, columns = PATH.pose_and_jacobian(AMOUNTS)
     for k in range(len(MOTIONS)):
         step = 1e-6 * np.eye(len(MOTIONS))[k]
         before, after = PATH.poses(AMOUNTS - step), PATH.poses(AMOUNTS + step)

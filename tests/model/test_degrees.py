@@ -13,7 +13,7 @@ from tests import urdfs
 from tests.cli.running import urdfkin as command
 from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import ImplausibleError
-from urdfkin.model.configuration import degrees_lines
+from urdfkin.model.configuration import degrees_messages
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import line
 
@@ -58,7 +58,7 @@ def test_each_function_warns_of_degrees(ur5: Robot, way: str) -> None:
 
 def test_the_warning_about_degrees_contains_the_line_about_the_limits(ur5: Robot) -> None:
     (first, *_) = ur5.limit_violations(DEGREES)
-    assert degrees_lines(ur5.tree, np.array(DEGREES))[0] == first
+    assert degrees_messages(ur5.tree, np.array(DEGREES))[0] == first
     with pytest.warns(urdfkin.DegreesWarning) as caught:
         ur5.to_pinocchio(DEGREES)
     assert first in str(caught[0].message)
@@ -84,7 +84,7 @@ def test_plausible_angles_and_absurdly_large_values_cause_no_warning(ur5: Robot,
 def test_lengths_and_joints_without_limits_cause_no_warning() -> None:
     joints = joint("wheel", "continuous", "a", "b"), joint("rail", "prismatic", "b", "c", more=limit(0, 1))
     robot = urdfkin.load(urdfs.robot(*joints))
-    assert robot.tree.least_implausible == math.inf
+    assert robot.tree.min_implausible_angle == math.inf
     robot.placement([300.0, 30.0])
 
 
@@ -97,15 +97,15 @@ def test_only_some_configurations_of_a_batch_are_checked_for_degrees(ur5: Robot)
             return np.asarray(self).ravel(*args, **options)
 
     q = np.degrees(ur5.sample(100_000)).reshape(100, 1000, 6)
-    assert degrees_lines(ur5.tree, q.view(Counted))
+    assert degrees_messages(ur5.tree, q.view(Counted))
     assert looked
     assert looked[0] <= 16 * 6
 
 
 def test_a_batch_in_radians_gets_no_hint(ur5: Robot) -> None:
     q = ur5.sample(200_000)
-    assert degrees_lines(ur5.tree, q) == []
-    assert degrees_lines(ur5.tree, q[::2, ::-1]) == []
+    assert degrees_messages(ur5.tree, q) == []
+    assert degrees_messages(ur5.tree, q[::2, ::-1]) == []
 
 
 # -- commands, calibration ---------------------------------------------------------------------------

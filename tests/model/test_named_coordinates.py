@@ -38,7 +38,7 @@ def arm() -> Robot:
 
 
 def q_of(robot: Robot, text: Any) -> list[float]:
-    return coordinate_layout(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
+    return coordinate_layout(robot.tree, "q").parse(text).tolist()  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_any_text_gives_finite_numbers_or_a_urdfkin_error(text: str) -> None:
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
     with contextlib.suppress(UrdfkinError):
-        assert np.isfinite(coordinate_layout(robot.tree, "q").read(text)).all()
+        assert np.isfinite(coordinate_layout(robot.tree, "q").parse(text)).all()
 
 
 def test_an_invalid_text_of_any_length_is_refused_without_delay(arm: Robot) -> None:
@@ -277,7 +277,7 @@ ALIKE = urdfs.robot(
 def test_coordinate_names_are_unique() -> None:
     robot = urdfkin.load(ALIKE)
     assert robot.coordinate_names == ("a:x", "a:y", "a:angle", "a.x")
-    assert robot.rate_names == ("a.vx", "a.vy", "a.wz", "a.x")
+    assert robot.velocity_names == ("a.vx", "a.vy", "a.wz", "a.x")
     moved = robot.placement("neutral, a.x=0.5", "s")
     np.testing.assert_array_equal(moved, robot.placement([0.0, 0.0, 0.0, 0.5], "s"))
     all_named = {"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}
@@ -296,10 +296,10 @@ def test_a_third_separator_avoids_a_third_equal_name() -> None:
 def test_equal_names_never_set_a_coordinate_to_zero() -> None:
     twice = CoordinateLayout("q", ("a", "a"), ("rad", "rad"))
     with pytest.raises(InputError, match="no value for a"):
-        twice.read({"a": 0.5})
+        twice.parse({"a": 0.5})
 
 
-def swapped(*asked: Any, right: Any = CoordinateLayout._by_name) -> Any:
+def swapped(*asked: Any, right: Any = CoordinateLayout._combine_values) -> Any:
     found = right(*asked)
     found[..., [0, 1]] = found[..., [1, 0]]
     return found
@@ -324,7 +324,7 @@ def test_values_assigned_to_the_wrong_coordinate_name_are_detected(
     robot = urdfkin.load(ARM)
     robot.placement(NAMED[given], "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_combine_values", swapped)
     with pytest.raises(urdfkin.VerificationError):
         robot.placement(NAMED[given], "e")
 
@@ -342,7 +342,7 @@ def test_an_exchanged_number_of_a_joint_with_several_disagrees(
     v = "neutral, root_joint.vx=0.1, root_joint.wz=3deg/s"
     robot.velocity("neutral", v, "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_combine_values", swapped)
     for q in written:
         with pytest.raises(urdfkin.VerificationError):
             robot.placement(q, "e")

@@ -19,8 +19,8 @@ from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
-from urdfkin.kinematics.rotation import SEQUENCES
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.kinematics.rotation import EULER_SEQUENCES
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
@@ -105,12 +105,12 @@ def test_bounds_refuse_a_reference_frame_without_properties(plan: CompiledTree, 
             movable(plan, NEW["bare"])
         return  # the size of a Jacobian's terms is the same in each reference frame
     with pytest.raises(REFUSED):
-        row.bound(plan, magnitudes(plan, X, X, X, STILL_STATE), NEW["bare"])
+        row.bound(plan, magnitudes(plan, X, X, X, FIXED_BASE_STATE), NEW["bare"])
 
 
 def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(plan: Any, reference: Reference) -> None:
     with pytest.raises(REFUSED):
-        QUANTITIES["hessian"].bound(plan, magnitudes(plan, X, X, X, STILL_STATE), reference)
+        QUANTITIES["hessian"].bound(plan, magnitudes(plan, X, X, X, FIXED_BASE_STATE), reference)
 
 
 @pytest.mark.parametrize("oracle", ORACLES)
@@ -132,7 +132,7 @@ def test_the_oracles_refuse_a_new_reference_frame(
 def test_kernels_and_command_line_support_every_reference_frame() -> None:
     assert dict(IN_KERNELS) == {reference: reference.value for reference in Reference}
     assert tuple(reference.name.lower() for reference in Reference) == REFERENCES
-    assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *SEQUENCES}
+    assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *EULER_SEQUENCES}
 
 
 # -- joint kinds -----------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def plan_of_last(robot: urdfkin.Robot) -> CompiledTree:
 METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
     "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
-    "size of terms": lambda robot, x: magnitudes(plan_of_last(robot), x, x, x, STILL_STATE),
+    "size of terms": lambda robot, x: magnitudes(plan_of_last(robot), x, x, x, FIXED_BASE_STATE),
     "pose": lambda robot, x: pose_of(robot.tree.joints[0].kind, x),
     "coordinates": lambda robot, _: coordinates_of(robot.tree.joints[0].kind, np.eye(4)),
     "sample": lambda robot, _: robot.sample(1),

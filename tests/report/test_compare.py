@@ -206,10 +206,10 @@ def test_repeated_robots_are_numbered() -> None:
 def test_merged_findings_count_separately_and_notes_do_not_count(before: int, after: int) -> None:
     old: Any = arms()
     new = copy.deepcopy(old)
-    finding = {"code": "URDF999", "severity": "warning", "also": []}
-    note = {"code": "URDF998", "severity": "note", "also": []}
+    finding = {"code": "URDF999", "severity": "warning", "other_lines": []}
+    note = {"code": "URDF998", "severity": "note", "other_lines": []}
     old["robots"][0]["findings"] = [finding] * before
-    new["robots"][0]["findings"] = [finding | {"also": list(range(after - 1))}] * bool(after) + [note]
+    new["robots"][0]["findings"] = [finding | {"other_lines": list(range(after - 1))}] * bool(after) + [note]
     found = [line for _, line in words(old, new) if "URDF99" in line]
     expected = f"panda: warning URDF999: {before or 'nothing'} -> {after or 'nothing'}"
     assert found == ([] if before == after else [expected])

@@ -12,6 +12,7 @@ from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
 from urdfkin.report.history import as_html, document, list_changes, read_history, verdict_marks
+from urdfkin.report.html import format_date
 from urdfkin.validation.campaign import validate
 
 
@@ -33,6 +34,33 @@ def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
     assert len(found.runs) == 8
     assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
     assert found.exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("started", "words"),
+    [
+        ("2026-11-28T10:30:00+00:00", "28 November 2026, 10:30 UTC"),
+        ("2026-11-28T10:30:00Z", "28 November 2026, 10:30 UTC"),
+        ("2026-11-28T10:30:00", "28 November 2026, 10:30 UTC"),  # a time without an offset is in UTC
+        ("2026-11-28T10:30:00+05:45", "28 November 2026, 04:45 UTC"),
+        ("2026-12-31T23:30:00-08:00", "1 January 2027, 07:30 UTC"),
+        ("0001-01-01T00:30:00+02:00", "0001-01-01T00:30:00+02:00"),  # before the first year of Python's dates
+        ("yesterday", "yesterday"),
+    ],
+)
+def test_a_page_states_a_start_time_in_utc(started: str, words: str) -> None:
+    assert format_date(started) == words
+
+
+def test_a_history_states_start_times_in_utc(tmp_path: Path) -> None:
+    saved(tmp_path / "a.json", arms() | {"started": "2026-11-28T01:30:00+02:00"})
+    saved(tmp_path / "b.json", arms() | {"started": "2026-11-27T20:00:00-05:00"})
+    found = read_history([tmp_path])
+    text, page = document(found).text(), as_html(found)
+    for date in ("2026-11-27 23:30", "2026-11-28 01:00"):
+        assert date in text
+        assert date in page
+    assert "28 November 2026, 01:00 UTC" in page
 
 
 def test_the_history_of_a_robot_has_a_point_for_each_run_with_the_robot(month: Path) -> None:

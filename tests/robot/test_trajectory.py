@@ -217,7 +217,7 @@ def test_a_trajectory_table_in_a_convention_is_converted_to_the_same_motion(tmp_
     mujoco = robot.convention("mujoco")
     names = [
         *mujoco.coordinate_names,
-        *(f"{letter}:{name}" for letter in "va" for name in mujoco.rate_names),
+        *(f"{letter}:{name}" for letter in "va" for name in mujoco.velocity_names),
     ]
     columns = {"time": x.t} | dict(zip(names, np.hstack(mujoco.to(x.q, x.v, x.a)).T, strict=True))
     path = write(tmp_path / "x.csv", columns)

@@ -14,13 +14,13 @@ import urdfkin
 from tests.robots.against_pinocchio import assert_agrees, model_of
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics.bodies import orientation_of
-from urdfkin.kinematics.rotation import SEQUENCES
-from urdfkin.model.configuration import draw_base
+from urdfkin.kinematics.rotation import EULER_SEQUENCES
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.system.resources import example_robots_dir
-from urdfkin.urdf.catalogue import catalogue, examples
+from urdfkin.urdf.catalogue import catalogue, example_robots
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -29,12 +29,12 @@ from urdfkin.verify.quantities import QUANTITIES
 WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
 
 #: The first robot of each family, an arm with a mimic joint, and a humanoid; the tests of others are slow.
-QUICK = {"panda", "talos", *{catalogue()[name].family: name for name in reversed(examples())}.values()}
+QUICK = {"panda", "talos", *{catalogue()[name].family: name for name in reversed(example_robots())}.values()}
 
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in examples()],
+    params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in example_robots()],
 )
 def robot(request: pytest.FixtureRequest) -> Robot:
     return urdfkin.load(request.param)
@@ -42,7 +42,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 def test_the_catalogue_contains_every_valid_urdf_of_example_robot_data() -> None:
     shipped = {path.relative_to(example_robots_dir()) for path in example_robots_dir().rglob("*.urdf")}
-    listed = [catalogue()[name].relative_path for name in examples()]
+    listed = [catalogue()[name].relative_path for name in example_robots()]
     assert len(listed) == len(set(listed)) == 68
     assert {path.name for path in shipped - set(listed)} == {"ur3.urdf"}
 
@@ -162,7 +162,7 @@ def test_the_coordinates_of_a_root_joint_are_those_of_pinocchio(name: str, root_
     assert np.abs(robot.from_pinocchio(full) - q).max() < 1e-14
     kind = JointKind.FLOATING if root_joint == "floating" else JointKind.PLANAR
     assert robot.tree.joints[0].kind is kind
-    assert robot.rate_names[0] == "root_joint.vx"
+    assert robot.velocity_names[0] == "root_joint.vx"
     assert urdfkin.validate(robot, samples=2).passed
 
 
@@ -259,7 +259,7 @@ def test_all_results_agree_with_pinocchio_even_on_a_moving_base(name: str, movin
     robot = urdfkin.load(name)
     q = robot.sample(4, 2)
     v, a = np.random.default_rng(3).normal(size=(2, 4, robot.nv))
-    base = draw_base(4, np.random.default_rng(1)) if moving else None
+    base = draw_base_motion(4, np.random.default_rng(1)) if moving else None
     robot.placement(q, robot.link_frames, base=base)
     for reference in Reference:
         robot.velocity(q, v, robot.link_frames, reference, base=base)
@@ -282,7 +282,7 @@ def test_an_error_of_the_jacobian_rate_is_detected(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("representation", [*SEQUENCES, "quaternion"])
+@pytest.mark.parametrize("representation", [*EULER_SEQUENCES, "quaternion"])
 def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation: str) -> None:
     robot = urdfkin.load("ur5")
     q, v, step = robot.sample(1, 7)[0], np.random.default_rng(8).normal(size=6), 1e-4

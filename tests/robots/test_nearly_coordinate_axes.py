@@ -162,7 +162,7 @@ def test_a_tilted_axis_is_a_note_and_results_are_verified(kind: str) -> None:
         robot = urdfkin.load(document)
     (finding,) = (finding for finding in robot.findings if finding.code == "URDF514")
     assert finding.severity is Severity.NOTE
-    assert finding.oracle is None
+    assert finding.pinocchio_reading is None
     robot.jacobian([0.4], "l1")
     assert robot.certificate().verified
 

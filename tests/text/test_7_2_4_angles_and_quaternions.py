@@ -18,7 +18,7 @@ from urdfkin.kinematics.rotation import (
     quaternion_of,
     quaternion_rate_matrix,
     quaternion_rates,
-    rotation_of,
+    rotation_from_quaternion,
     skew,
 )
 
@@ -114,7 +114,11 @@ def test_example_7_3_angular_velocities_with_equal_integrals_give_different_orie
     assert np.abs(sum(w(t) for t in middles) / 100.0 - [QUARTER, QUARTER, 0.0]).max() < 1e-12
     quats = integrate_orientation(w, [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 401))
     # A method of fourth order with 200 steps for a quarter turn has an error near 1e-11.
-    assert np.abs(rotation_of(quats[-1]) @ Z - z1_ends_as).max() < 1e-9
+    assert np.abs(rotation_from_quaternion(quats[-1]) @ Z - z1_ends_as).max() < 1e-9
     assert (
-        np.abs(rotation_of(quaternion_of(rotation_of(quats[-1]))) - rotation_of(quats[-1])).max() <= ROUNDING
+        np.abs(
+            rotation_from_quaternion(quaternion_of(rotation_from_quaternion(quats[-1])))
+            - rotation_from_quaternion(quats[-1])
+        ).max()
+        <= ROUNDING
     )

@@ -24,7 +24,15 @@ from urdfkin.kinematics.bodies import (
     point_acceleration,
     velocity_jacobian,
 )
-from urdfkin.kinematics.registry import LAST, LOST, Equation, equations, explain, misprints, table
+from urdfkin.kinematics.registry import (
+    LAST_EQUATION,
+    LOST_EQUATIONS,
+    Equation,
+    equations,
+    equations_page,
+    explain,
+    misprints,
+)
 from urdfkin.kinematics.rotation import (
     euler_rate_matrix,
     quaternion_of,
@@ -86,9 +94,11 @@ def passes_as_it_is(test: str) -> bool:
 
 
 def test_the_table_contains_every_equation_except_the_four_lost_equations() -> None:
-    assert list(equations()) == [f"7.{i}" for i in range(1, LAST + 1) if f"7.{i}" not in LOST]
+    assert list(equations()) == [
+        f"7.{i}" for i in range(1, LAST_EQUATION + 1) if f"7.{i}" not in LOST_EQUATIONS
+    ]
     assert len(equations()) == 126
-    assert LOST == ("7.6", "7.8", "7.9", "7.10")
+    assert LOST_EQUATIONS == ("7.6", "7.8", "7.9", "7.10")
 
 
 def test_every_function_and_test_in_the_equation_table_exists() -> None:
@@ -122,7 +132,7 @@ def test_every_listed_misprint_has_a_passing_test() -> None:
 
 def test_the_generated_page_of_equations_is_current() -> None:
     page = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    assert page == table(), "run python scripts/make_pages.py equations"
+    assert page == equations_page(), "run python scripts/make_pages.py equations"
 
 
 def test_explain_describes_each_equation_and_states_the_lost_equations() -> None:

@@ -188,7 +188,7 @@ def test_a_tree_written_once_or_twice_is_read_back_unchanged(tree: KinematicTree
 @settings(max_examples=30)
 @given(trees(max_joints=6))
 def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
-    if any(finding.oracle for finding in check_text(to_urdf(tree).encode())):
+    if any(finding.pinocchio_reading for finding in check_text(to_urdf(tree).encode())):
         return
     robot = loaded(tree)
     q = robot.sample(2, seed=0) if robot.nq else np.zeros((2, 0))
@@ -225,7 +225,7 @@ def test_an_infinite_effort_limit_is_written_in_urdf_version_1_2() -> None:
     tree = build_tree("r", "a", [(own, "a", "b")])
     text = to_urdf(tree)
     assert 'version="1.2"' in text
-    assert [f.oracle for f in check_text(text.encode())] == [None]
+    assert [f.pinocchio_reading for f in check_text(text.encode())] == [None]
     assert_same(tree_of(text.encode()), tree)
 
 

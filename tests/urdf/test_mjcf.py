@@ -242,7 +242,7 @@ def test_at_q_zero_a_mimic_joint_has_its_offset_and_a_free_body_is_at_the_origin
     assert read.tree.links[0] == "world"
     q = np.zeros((1, read.tree.nq))
     q[0, 6] = 1.0
-    assert read.qpos(q)[0, read.coordinates["f"]] == pytest.approx(0.1 - math.pi / 3)
+    assert read.qpos(q)[0, read.qpos_index["f"]] == pytest.approx(0.1 - math.pi / 3)
     assert read.placements(q)[0, list(read.frames).index("base"), :3, 3] == pytest.approx([0.0, 0.0, 0.0])
 
 
@@ -370,7 +370,7 @@ def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.mark.parametrize(
     ("where", "name", "mistake"),
-    [(mjcf._MjcfReader, "_rule", wrong_offset), (mjcf, "resolve", wrong_multiplier)],
+    [(mjcf._MjcfReader, "_read_rule", wrong_offset), (mjcf, "resolve_rule", wrong_multiplier)],
     ids=["an offset", "the multiplier of a mimic of a mimic"],
 )
 def test_the_residual_of_mujocos_equality_finds_an_error_of_a_mimic_rule(
@@ -395,8 +395,8 @@ def test_an_additional_mimic_rule_and_a_missing_mimic_rule_are_found(
     rule = '<joint name="x" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="{}"/>'
     other = mjcf.read_mjcf(coupled(rule.format("true" if active == "false" else "false")), "other")
 
-    def mixed(source: str, name: str, *, whole: bool = False) -> Mjcf:
-        return replace(other, model=mjcf.read_mjcf(source, name, whole=whole).model)
+    def mixed(source: str, name: str, *, with_shapes: bool = False) -> Mjcf:
+        return replace(other, model=mjcf.read_mjcf(source, name, with_shapes=with_shapes).model)
 
     patch.setattr(mjcf_process, "read_mjcf", mixed)
     with pytest.raises(OracleError, match=said):

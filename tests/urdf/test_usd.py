@@ -24,12 +24,17 @@ from tests.cli.running import urdfkin as command
 from tests.reading import present
 from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.result import Sameness, SameQuestion
+from urdfkin.comparison.result import Sameness, SameQuestion, Verdict
 from urdfkin.errors import InputError, OracleError, SourceError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
-from urdfkin.model.conventions.convention import transcoded
-from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
+from urdfkin.kinematics.rotation import (
+    quaternion_of,
+    rotation_about,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
+from urdfkin.model.conventions.convention import transcode
+from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
 from urdfkin.verify import usd_check
@@ -112,6 +117,15 @@ def findings(robot: urdfkin.Robot) -> list[str]:
 def reach(robot: urdfkin.Robot) -> float:
     """Return the x coordinate of the link `lower` at q = 0."""
     return float(robot.placement([0.0, 0.0], "lower")[0, 3])
+
+
+def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_the_other(read: Read) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, "inf"), localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == (-1.0, 1000.0)
+    what = "a prismatic joint without an upper limit gets +1000 m, because URDF requires limits"
+    assert findings(robot) == [f"USD102 /arm/rail: {what}"]
 
 
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
@@ -379,7 +393,7 @@ def test_a_variant_is_selected(write: Write) -> None:
     assert reach(robot) == pytest.approx(5.0)
     assert codes(robot) == {}
     assert path.read_bytes() == before
-    assert "--variant gripper=long" in robot.origin.words
+    assert "--variant gripper=long" in robot.origin.command_line
     for wrong, named in (({"gripper": "lon"}, "long"), ({"griper": "long"}, "gripper")):
         with pytest.raises(InputError, match=named):
             loaded(path, variant=wrong)
@@ -482,6 +496,10 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "a joint outside the articulation": (
         ARM + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), ["USD101 /arm/closing"],
     ),
+    "a distance joint": (
+        ARM + joint("rope", "Distance", "upper", "lower"),
+        ["USD101 /arm/rope: a tree cannot represent this DistanceJoint"],
+    ),
     "a disabled joint": (
         ARM + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
         ["USD101 /arm/off"],
@@ -511,7 +529,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "an equality with more terms than the mimic rule": (equality(1), ["USD101 /arm/rail"]),
     "a joint with a schema that would be listed": (
         ARM + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
-        ["USD101 /arm/weld: a tree cannot represent this FixedJoint, which is outside the articulation"],
+        ["USD101 /arm/weld: this FixedJoint is excluded from the articulation"],
     ),
     "a PointInstancer of a shape": (
         ARM + CROWD % 'def Cube "one" {\n}\n',
@@ -565,7 +583,7 @@ def test_a_blocked_value_is_treated_as_missing(read: Read) -> None:
 
 
 def test_a_spline_without_a_default_value_is_reported(write: Write) -> None:
-    if not hasattr(usd.library().Usd.Attribute, "HasSpline"):
+    if not hasattr(usd.import_openusd().Usd.Attribute, "HasSpline"):
         pytest.skip("this OpenUSD has no splines")
     spline = "double xformOp:translateZ.spline = {\n1: 1; post held,\n}"
     text = stage(ARM).replace("double3 xformOp:translate = (0, 0, 1)", spline)
@@ -672,7 +690,7 @@ def test_a_reference_outside_the_folder_is_refused(write: Write, reference: str,
     }.get(arc, f'#usda 1.0\ndef "x" {own} {{ }}\n')
     path.write_text(text)
     with pytest.raises(InputError, match=why):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     if arc == "reference":
         with pytest.raises(InputError, match=why):
             loaded(path)
@@ -688,7 +706,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("arc", LOOPS)
-def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(write: Write, arc: str) -> None:
+def test_layers_that_refer_to_each_other_in_a_cycle_are_a_finding(write: Write, arc: str) -> None:
     arm, files = stage(ARM).partition(")\n")[2], []
     for own, other in ("ab", "bc", "ca"):
         head, x = (part.format(other) for part in LOOPS[arc])
@@ -722,7 +740,7 @@ def test_layers_of_hundreds_of_megabytes_are_refused_before_they_are_read(write:
     begin = time.monotonic()
     words = r"large\.usdc: the file is too large: found 700000000 bytes"
     with pytest.raises(SourceError, match=words):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     with pytest.raises(InputError, match=words):
         loaded(path)
     assert time.monotonic() - begin < 30.0
@@ -737,21 +755,21 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     own = path.stat().st_size
     monkeypatch.setattr(usd, "MOST", own + 2000)
     with pytest.raises(SourceError, match=f"too large: found over {own + 2000} bytes"):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     monkeypatch.setattr(usd, "MOST", own + 5000)
-    assert len(usd.files_of(usd.library(), str(path))) == 6
+    assert len(usd.find_layer_files(usd.import_openusd(), str(path))) == 6
 
 
 def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     refs = "".join(f'def "x{k}" (references = @./part{k}.usdc@</a>) {{ }}\n' for k in range(200))
     path = write(stage(ARM + refs))
-    part = usd.library().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
+    part = usd.import_openusd().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
     for k in range(200):  # the process may have 64 open files
         part.Export(str(path.with_name(f"part{k}.usdc")))
     assert loaded(path).nq == 2
     monkeypatch.setattr(usd, "_LAYERS", 100)
     with pytest.raises(InputError, match="too many layers: found over 100"):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
 
 
 def test_textures_and_other_assets_are_never_opened(write: Write, tmp_path: Path) -> None:
@@ -788,7 +806,9 @@ DEEDS = {
 @pytest.mark.parametrize("deed", DEEDS)
 def test_the_confined_process_cannot_write_files_or_start_processes(tmp_path: Path, deed: str) -> None:
     file = tmp_path / "made"
-    words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
+    words = (
+        f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit_process(5)\n{DEEDS[deed]}"
+    )
     if os.geteuid() == 0 and deed != "write":
         pytest.skip("the kernel does not limit the processes of root")
     assert python(words, str(file), check=False, timeout=60).returncode != 0
@@ -849,7 +869,7 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 ) -> None:
     path = write(stage(ARM, unit=0.5))
     assert loaded_in_this_process(monkeypatch, path).nq == 2
-    side, motion = usd._StageReader._side, usd._StageReader._motion
+    side, motion = usd._StageReader._read_side, usd._StageReader._read_motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
         found = present(side(self, prim, 1 - i if mistake == "swapped" else i, target))
@@ -862,8 +882,8 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
         factor = 180.0 / math.pi if mistake == "degrees" else 1.0
         return kind, axis, (lower * factor, upper * factor), "rotX" if mistake == "axis" else free
 
-    monkeypatch.setattr(usd._StageReader, "_side", wrong_side)
-    monkeypatch.setattr(usd._StageReader, "_motion", wrong_motion)
+    monkeypatch.setattr(usd._StageReader, "_read_side", wrong_side)
+    monkeypatch.setattr(usd._StageReader, "_read_motion", wrong_motion)
     with pytest.raises(OracleError, match="parser of UsdPhysics and urdfkin disagree about this joint"):
         loaded_in_this_process(monkeypatch, path)
 
@@ -880,7 +900,7 @@ def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
     placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
     for link, T in zip(tree.links, placements, strict=True):
         placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
-        prims.append(body(transcoded(link), "", placed, ROOT * (link == tree.links[0])))
+        prims.append(body(transcode(link), "", placed, ROOT * (link == tree.links[0])))
     joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
@@ -903,20 +923,20 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
-    ends = [transcoded(tree.links[one.parent]), transcoded(tree.links[k + 1])]
+    ends = [transcode(tree.links[one.parent]), transcode(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
     rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{transcoded(rule.leader)}")
+        words = FOLLOWS.format(f"joints/{transcode(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
-    if one.limit is not None and one.kind.bounded:
+    if one.limit is not None and one.kind.has_limits:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
-    return joint(transcoded(one.name), name, first, second, words, schema, limits=limits, **frames)
+    return joint(transcode(one.name), name, first, second, words, schema, limits=limits, **frames)
 
 
 _X = np.array([1.0, 0.0, 0.0])
@@ -1117,7 +1137,7 @@ def test_each_mistake_of_a_converter_is_detected_and_described(converted: Read, 
         said = [*found.up_to, *codes(wrong)]
         said += [one.words for one in (*found.differences, *found.remarks)]
         # If the limits are too large for radians, only `same` reports the mistake.
-        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE
+        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > MAX_PLAUSIBLE_ANGLE
         assert not found.up_to_single or kind == "radians", (kind, name)
         assert any((": limits " if wide else word) in one for one in said), (kind, name, said)
         if kind == "radians":
@@ -1256,7 +1276,7 @@ def test_the_newton_simulator_computes_the_same_placements(write: Write, up: str
             T = robot.placement(q, str(label).rpartition("/")[2])
             assert seven[:3] == pytest.approx(T[:3, 3], abs=1e-5)
             x, y, z, w = seven[3:].astype(float) / np.linalg.norm(seven[3:])
-            assert pose(rotation_of([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
+            assert pose(rotation_from_quaternion([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
 
 
 def turn(name: str, first: str, second: str, place: Sequence[float], rotation: object = (1, 0, 0, 0)) -> str:
@@ -1328,6 +1348,69 @@ def test_only_the_rounding_of_a_number_explains_a_difference_in_either_order_of_
     assert [one.up_to_single for one in found] == [explained] * 2
 
 
+def with_a_link_between(x: float, *, in_the_stage: bool) -> tuple[str, str]:
+    """Write a URDF and a stage with two joints; one of the files has a link of its own between the joints.
+
+    `x` is a number of the second joint: 0.25 is exact in single precision, and 0.1 is rounded. The common
+    link `b` has the pose of the link between the joints.
+    """
+    mount = urdfs.joint("mount", "fixed", "between", "b")
+    other = joint("mount", "Fixed", "between", "b", localPos0=(0, 0, 0))
+    ours, theirs = ("b", "between") if in_the_stage else ("between", "b")
+    urdf = urdfs.robot(
+        urdfs.joint("first", "continuous", "base", ours, 'xyz="0 0 0.5"'),
+        urdfs.joint("second", "continuous", ours, "tip", f'xyz="{x} 0 0.5"'),
+        "" if in_the_stage else mount,
+    )
+    links = BASE + body("b") + body("tip") + (body("between") + other if in_the_stage else "")
+    joints = turn("first", "base", theirs, (0, 0, 0.5)) + turn("second", theirs, "tip", (x, 0, 0.5))
+    return urdf, links + joints
+
+
+def test_two_joints_of_a_stage_without_a_common_link_between_them_may_not_be_rounded(read: Read) -> None:
+    urdf, content = with_a_link_between(0.25, in_the_stage=True)
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.verdict is Verdict.SAME
+        assert not found.unexplained
+    urdf, content = with_a_link_between(0.1, in_the_stage=True)
+    why = "the joints between this link and the nearest common link cannot be compared"
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.verdict is Verdict.DIFFERS
+        assert [(one.place, one.what) for one in found.differences] == [("joint second", "axis")]
+        assert [str(one) for one in found.unexplained] == [f"link tip: {why}"]
+    # If only the URDF has a link between the joints, the common link `b` is between the joints of the stage.
+    urdf, content = with_a_link_between(0.1, in_the_stage=False)
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.up_to_single, found.unexplained
+
+
+@pytest.mark.parametrize("names", [("hand", "camera"), ("hand.0", "camera.0")])
+@pytest.mark.parametrize("x", [0.25, 0.1])
+def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_rounding(
+    read: Read, x: float, names: tuple[str, str]
+) -> None:
+    hand, camera = map(transcode, names)
+    urdf = urdfs.robot(
+        urdfs.joint("first", "continuous", "base", "b", 'xyz="0 0 0.5"'),
+        urdfs.joint("second", "continuous", "b", names[0], f'xyz="{x} 0 0.5"'),
+        urdfs.joint("mount", "fixed", "base", names[1], 'xyz="1 0 0"'),
+    )
+
+    def content(moved: str, fixed: str) -> str:
+        joints = turn("first", "base", "b", (0, 0, 0.5)) + turn("second", "b", moved, (x, 0, 0.5))
+        mount = joint("mount", "Fixed", "base", fixed, localPos0=(1, 0, 0))
+        return BASE + body("b") + body(hand) + body(camera) + joints + mount
+
+    for found in in_both_orders(loaded(urdf), read(content(hand, camera))):
+        assert found.verdict is (Verdict.SAME if x == 0.25 else Verdict.UP_TO_SINGLE)
+    for found in in_both_orders(loaded(urdf), read(content(camera, hand))):
+        assert found.verdict is Verdict.DIFFERS
+        assert {one.what for one in found.differences} >= {"carried by"}
+        assert [str(one) for one in found.unexplained] == [
+            "joint second: carries no link that both models have"
+        ]
+
+
 @pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
 def test_locked_joints_may_differ_only_by_rounding(converted: Read, lock: dict[str, float]) -> None:
     text = LONG_SLIDE.replace("1000", "1")
@@ -1389,7 +1472,7 @@ def _angle_between(T: Any, U: Any) -> float:
 
 
 def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_precision() -> None:
-    pxr, rng = usd.library(), np.random.default_rng(3)
+    pxr, rng = usd.import_openusd(), np.random.default_rng(3)
     made, gf = pxr.Usd.Stage.CreateInMemory(), pxr.Gf
     reader = usd._StageReader(pxr, made, "", frozenset())
     reader._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
@@ -1398,7 +1481,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         prim = pxr.UsdGeom.Xform.Define(made, f"/{op}{k}{precision}")
         how = [] if op == "Transform" else [getattr(pxr.UsdGeom.XformOp, f"Precision{precision}")]
         getattr(prim, f"Add{op}Op")(*how).Set(value)
-        return reader._placed(prim.GetPrim())[0]
+        return reader._world_pose(prim.GetPrim())[0]
 
     orders = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
     worst = dict.fromkeys(("Rotate", "Orient", "Transform"), 0.0)
@@ -1409,7 +1492,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         xyzw = rng.normal(size=4)
         xyzw /= np.linalg.norm(xyzw)
         w, v = float(xyzw[3]), xyzw[:3].tolist()
-        matrix = pose(rotation_of(xyzw)).T
+        matrix = pose(rotation_from_quaternion(xyzw)).T
         for op, exact, rounded in (
             (f"Rotate{orders[k % 6]}", gf.Vec3d(*degrees), gf.Vec3f(*degrees)),
             (f"Rotate{'XYZ'[k % 3]}", float(degrees[0]), float(np.float32(degrees[0]))),
@@ -1418,7 +1501,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         ):
             angle = _angle_between(placed(op, exact, "Double", k), placed(op, rounded, "Float", k))
             kind = op.rstrip("XYZ")
-            worst[kind] = max(worst[kind], angle / SINGLE)
+            worst[kind] = max(worst[kind], angle / SINGLE_ROUNDOFF)
     # The error of an angle above 256 degrees is at most 2^-16 degrees; the errors of several angles add.
     assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
     assert 1.0 < worst["Orient"] <= 4.0

@@ -65,8 +65,8 @@ def test_the_expansion_stays_in_the_working_directory(arm: Path, monkeypatch: py
 def test_the_command_and_the_call_that_load_a_robot_again_contain_the_arguments(arm: Path) -> None:
     robot = urdfkin.load(arm, xacro_args={"n": 3})
     assert robot.source == str(arm)
-    assert robot.origin.words == f"{arm} --xacro-arg n:=3"
-    assert eval(robot.origin.python, {"urdfkin": urdfkin}).urdf == robot.urdf
+    assert robot.origin.command_line == f"{arm} --xacro-arg n:=3"
+    assert eval(robot.origin.python_call, {"urdfkin": urdfkin}).urdf == robot.urdf
     report = urdfkin.validate(arm, samples=0, xacro_args={"n": 3})
     assert report.command == f"urdfkin validate {arm} --samples 0 --seed 0 --xacro-arg n:=3"
 
@@ -130,16 +130,16 @@ def test_packages_are_searched_in_the_documented_order(tmp_path: Path) -> None:
     places = [tmp_path / place for place in ("ros/pkg", "src/repository/pkg", "opt/share/pkg")]
     for folder in (*places, above / "urdf"):
         folder.mkdir(parents=True)
-    beside = above / "urdf" / "a.urdf"
+    referring_file = above / "urdf" / "a.urdf"
     environ = {
         "ROS_PACKAGE_PATH": os.pathsep.join((str(tmp_path / "ros"), str(tmp_path / "src"))),
         "AMENT_PREFIX_PATH": str(tmp_path / "opt"),
     }
     for place in places:
-        assert find_package("pkg", beside, environ) == place
+        assert find_package("pkg", referring_file, environ) == place
         place.rmdir()
-    assert find_package("pkg", beside, environ) == above
-    assert find_package("other", beside, environ) is None
+    assert find_package("pkg", referring_file, environ) == above
+    assert find_package("other", referring_file, environ) is None
 
 
 def test_a_package_is_also_found_by_its_search_path_or_its_manifest_but_not_by_an_invalid_name(

@@ -17,9 +17,9 @@ from urdfkin import BaseMotion
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
-from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of
+from urdfkin.kinematics.rotation import EULER_SEQUENCES, quaternion_of
 from urdfkin.model import base_motion as recursion_base
-from urdfkin.model.configuration import draw_base
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import accuracy_words, more_accurate, more_accurate_counts
@@ -69,7 +69,7 @@ def test_decimals_are_read_exactly_and_a_wrong_number_of_bases_is_refused() -> N
     assert abs(5 * joints[2].p[0] - 2) < 1e-78
     assert not joints[2].p[0].contains(0.4)
     with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
-        accuracy_study(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
+        accuracy_study(urdfkin.load("polar"), samples=2, base=draw_base_motion(3, np.random.default_rng(1)))
 
 
 def test_exact_velocity_and_acceleration_of_the_elbow_are_derivatives_to_many_digits() -> None:
@@ -160,7 +160,7 @@ def test_the_errors_of_urdfkin_are_at_most_twice_those_of_pinocchio(name: str) -
 
 def test_a_moving_base_equals_a_floating_joint_with_the_same_motion() -> None:
     # The velocities of the floating joint are in the child link's axes: u = R^T vel, o = R^T w.
-    base, robot = draw_base(1, np.random.default_rng(3)), robot_of("tree_3")
+    base, robot = draw_base_motion(1, np.random.default_rng(3)), robot_of("tree_3")
     hung = robot_of("tree_3", root_joint="floating")
     generator = np.random.default_rng(4)
     q = robot.sample(1, 4)[0]
@@ -193,7 +193,7 @@ def test_a_moving_base_equals_a_floating_joint_with_the_same_motion() -> None:
 def test_errors_are_small_on_a_moving_base(name: str, root_joint: str | None) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
     still = accuracy_study(robot, samples=2)
-    for base in (draw_base(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
+    for base in (draw_base_motion(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
         moving = accuracy_study(robot, samples=2, base=base)
         assert moving.moving_base
         assert len(moving.lines) == len(still.lines)
@@ -203,7 +203,7 @@ def test_errors_are_small_on_a_moving_base(name: str, root_joint: str | None) ->
 
 @pytest.mark.long
 def test_a_base_motion_that_differs_slightly_in_one_library_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
+    robot, base = urdfkin.load("ur5"), draw_base_motion(2, np.random.default_rng(1))
     original = recursion_base.BaseMotion.state
 
     def off(self: BaseMotion, batch_shape: tuple[int, ...]) -> FloatArray:
@@ -256,7 +256,7 @@ def test_the_exact_analytical_jacobian_is_the_difference_quotient_of_the_pose(na
             assert abs(J[row, column] - (late - early) / (2 * step)) < 1e-28  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
+@pytest.mark.parametrize("name", [name for name in EULER_SEQUENCES if name.islower()])
 def test_angles_about_fixed_axes_have_the_rows_of_euler_angles_in_reverse_order(name: str) -> None:
     robot = urdfkin.load("panda", verify=False)
     q = robot.sample(5, 0)

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from tests.report.test_texts import junit_of
 from tests.robots.odd_urdfs import random_tree
 from tests.urdfs import built, joint
 from tests.urdfs import robot as robot_text
+from urdfkin.model.conventions import find_convention
 from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
@@ -167,7 +169,7 @@ def test_the_diagnosis_names_a_reversed_joint_and_exchanged_joints(name: str, qu
 def without_mimic_columns(robot: Robot, frame: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
     """Return a Jacobian to which the columns of mimic joints are not added."""
     free = urdfkin.load(robot.source, mimic=False, verify=False, **options)
-    own = [free.rate_names.index(x) for x in robot.rate_names]
+    own = [free.velocity_names.index(x) for x in robot.velocity_names]
     return lambda q: free.jacobian(free.from_pinocchio(robot.to_pinocchio(q)), frame)[:, own]
 
 
@@ -312,13 +314,23 @@ def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
     how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
     moving = not tool.conversion.is_constant and quantity in ("jacobian rate", "hessian")
     if moving:
-        with pytest.raises(urdfkin.InputError, match="has other axes or another reference point"):
+        with pytest.raises(urdfkin.InputError, match="floating or planar joint has other axes"):
             verify_function(right, robot, quantity, **how)
         return
     assert verify_function(right, robot, quantity, **how).agrees
     if quantity != "placement":
         found = verify_function(lambda *i: right(*i)[_HALVES], robot, quantity, **how)
         check_diagnosis(found, "rows come first")
+
+
+@pytest.mark.parametrize("quantity", ["jacobian rate", "hessian"])
+def test_a_function_for_the_centre_of_mass_in_the_axes_of_the_body_is_checked(quantity: str) -> None:
+    robot = urdfkin.load("go2", root_joint="floating")
+    convention = replace(find_convention("urdfkin"), name="centre", point="centre of mass")
+    right = computed(robot.with_convention(convention), quantity, "FL_foot")  # type: ignore[arg-type]
+    how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
+    assert verify_function(right, robot, quantity, **how).agrees
+    assert not verify_function(computed(robot, quantity, "FL_foot"), robot, quantity, **how).agrees
 
 
 def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> None:

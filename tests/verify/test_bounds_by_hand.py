@@ -11,8 +11,8 @@ from tests.laws.subjects import NAMES, robot_of, state
 from tests.urdfs import joint, limit, mimic
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS, of_joints
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS, joint_roundings
+from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify import bounds, derived
@@ -40,7 +40,7 @@ LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_
 
 
 def sizes(tilt: float = 0.0) -> Magnitudes:
-    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, of_joints(JOINTS, tilt))))
+    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, joint_roundings(JOINTS, tilt))))
 
 
 @pytest.fixture(scope="module")
@@ -212,7 +212,7 @@ def test_no_result_exceeds_the_computed_magnitude(
     v, a = sizes[0] * v, sizes[1] * a
     rng = np.random.default_rng(2)
     base = BaseMotion(velocity=rng.normal(size=6), acceleration=rng.normal(size=6)).state(())
-    base = base if moving else STILL_STATE
+    base = base if moving else FIXED_BASE_STATE
     plan = robot.plan(range(len(robot.link_names)))
     size = magnitudes(plan, q, v, a, base)
     vel, acc = velocities(plan, q, v, base=base), accelerations(plan, q, v, a, base=base)
@@ -228,7 +228,7 @@ def test_no_result_exceeds_the_computed_magnitude(
 
 def of_the_arm(q: list[float], v: list[float], a: list[float]) -> Magnitudes:
     robot = urdfkin.load(LONG_ARM)
-    return magnitudes(robot.plan([4]), np.array([q]), np.array([v]), np.array([a]), STILL_STATE)
+    return magnitudes(robot.plan([4]), np.array([q]), np.array([v]), np.array([a]), FIXED_BASE_STATE)
 
 
 def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:
@@ -239,7 +239,7 @@ def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:
     assert size.vel == 2.0 * 2.0 + 5.0 * 1.75
     assert size.alpha == 2.0 * 2.0 + 3.0 * (2.0 + 3.0)  # Pinocchio's term v w x z, which cancels later
     assert size.acc == (4.0 + 4.0) * 2.0 + (size.alpha + 25.0) * 1.75
-    assert size.roundings == 5 * ROUNDINGS
+    assert size.roundings == 5 * PINOCCHIO_ROUNDINGS
 
 
 def test_magnitudes_include_prismatic_joints_and_joint_accelerations_as_in_7_130() -> None:

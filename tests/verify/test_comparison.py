@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 from scripts.check_bits import WAYS
 from urdfkin.compiled.preload import Way, only
-from urdfkin.kinematics.roundings import EPS, SMALLEST
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import disagreement, worst_of_each
 
-ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
+ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST_NORMAL, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
 NEVER = (np.inf, -np.inf, np.nan)
 numbers = st.one_of(st.floats(-10.0, 10.0), st.sampled_from(ODD), st.floats(), st.sampled_from(NEVER))
 scales = st.one_of(
-    st.floats(0.0, 100.0), st.sampled_from([0.0, 5e-324, SMALLEST / EPS, 1e300, np.inf, np.nan])
+    st.floats(0.0, 100.0), st.sampled_from([0.0, 5e-324, SMALLEST_NORMAL / EPS, 1e300, np.inf, np.nan])
 )
 
 

@@ -21,7 +21,7 @@ from tests.random_chains import shift
 from tests.urdf.lint.cases.arm import arm, fixed
 from tests.urdfs import joint, loaded, mimic
 from urdfkin.errors import InstallationError, UnknownNameError
-from urdfkin.model.configuration import draw_base
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.campaign import validate
@@ -138,7 +138,7 @@ def test_mujoco_agrees_for_every_quantity_and_reference_frame(name: str, far: fl
     text, options = SUBJECTS[name]
     robot, base = loaded(text, oracle="mujoco", **options), None
     if far is not None:
-        base = draw_base(1, np.random.default_rng(0))
+        base = draw_base_motion(1, np.random.default_rng(0))
         base = replace(base, placement=shift(far, far, far) @ base.placement)
     ask_everything(robot, 5, base)
     certificate = robot.certificate()

@@ -19,7 +19,7 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.preload import only
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
-from urdfkin.model.configuration import draw, draw_base, special
+from urdfkin.model.configuration import draw_base_motion, draw_samples, special_configurations
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
@@ -215,17 +215,17 @@ def test_coupled_columns_of_a_robot_without_joint_velocities_are_empty(rows: int
 @pytest.mark.parametrize("with_special", [True, False])
 def test_special_configurations_come_first_on_request(with_special: bool) -> None:
     robot = urdfkin.load("panda")
-    drawn = draw(robot.tree, 40, np.random.default_rng(0), with_special=with_special)
+    drawn = draw_samples(robot.tree, 40, np.random.default_rng(0), with_special=with_special)
     extra = 3 if with_special else 0
     assert drawn.q.shape[0] == drawn.v.shape[0] == drawn.a.shape[0] == 40 + extra
-    assert (drawn.q[:3] == special(robot.tree)).all() == with_special
+    assert (drawn.q[:3] == special_configurations(robot.tree)).all() == with_special
     limits = [joint.limit for joint in robot.tree.joints if joint.nq == 1]
-    assert special(robot.tree)[1].tolist() == [limit.lower for limit in limits if limit]
-    assert special(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
+    assert special_configurations(robot.tree)[1].tolist() == [limit.lower for limit in limits if limit]
+    assert special_configurations(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
 
 
 def test_every_eighth_sample_has_joint_velocities_a_hundred_times_as_large() -> None:
-    drawn = draw(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
+    drawn = draw_samples(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
     demand_large_rates(drawn.v, drawn.a)
 
 
@@ -237,7 +237,7 @@ def demand_large_rates(*rates: FloatArray) -> None:
 
 
 def test_every_sample_has_a_different_placement_and_motion_of_the_base() -> None:
-    base = draw_base(400, np.random.default_rng(0))
+    base = draw_base_motion(400, np.random.default_rng(0))
     assert base.batch_shape == (400,)
     assert np.abs(base.placement[:, :3, 3]).max() <= 2.0
     assert np.unique(base.placement[:, :3, :3].round(6), axis=0).shape[0] == 400

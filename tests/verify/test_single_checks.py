@@ -17,8 +17,8 @@ from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.preload import only
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import draw, draw_base
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import draw_base_motion, draw_samples
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.bounds import Bound, magnitudes
@@ -47,7 +47,7 @@ def test_the_check_of_a_single_call_records_the_results_of_the_check_of_a_batch(
     prompt, usual = urdfkin.load(name), urdfkin.load(name)
     frame = prompt.tip_frame
     for seed, reference in enumerate(Reference):
-        drawn = draw(prompt.tree, 6, np.random.default_rng(seed), with_special=True)
+        drawn = draw_samples(prompt.tree, 6, np.random.default_rng(seed), with_special=True)
         for row in zip(drawn.q, drawn.v, drawn.a, strict=True):
             for method, count in METHODS.items():
                 where: tuple[Any, ...] = (frame,) if method == "placement" else (frame, reference)
@@ -154,10 +154,10 @@ def test_a_checked_jacobian_needs_at_most_130_function_calls(name: str) -> None:
 def test_magnitudes_of_one_configuration_are_equal_alone_and_in_a_batch(subject: str, moving: bool) -> None:
     robot = robot_of(subject) if subject in NAMES else urdfkin.load(subject, verify=False)
     rng = np.random.default_rng(1)
-    drawn = draw(robot.tree, 9, rng, with_special=True)
+    drawn = draw_samples(robot.tree, 9, rng, with_special=True)
     drawn.v[3], drawn.a[4], drawn.v[5] = 0.0, 1e-310, 1e-200
     n = len(drawn.q)
-    base = draw_base(n, rng).state((n,)) if moving else STILL_STATE
+    base = draw_base_motion(n, rng).state((n,)) if moving else FIXED_BASE_STATE
     plan = robot.plan(range(len(robot.link_names)))
     for v, a in ((None, None), (drawn.v, None), (drawn.v, drawn.a)):
         every = magnitudes(plan, drawn.q, v, a, base)
@@ -174,7 +174,7 @@ def test_magnitudes_of_one_configuration_are_equal_alone_and_in_a_batch(subject:
 def test_a_bound_that_is_computed_once_is_valid_for_every_configuration(name: str, moving: bool) -> None:
     robot = urdfkin.load(name)
     q, rng = robot.sample(5, 1), np.random.default_rng(2)
-    base = draw_base(5, rng) if moving else None
+    base = draw_base_motion(5, rng) if moving else None
     for frame in (robot.tip_frame, [*robot.link_names[-2:]]):
         for quantity in (QUANTITIES["placement"], JACOBIAN, QUANTITIES["hessian"]):
             for reference in Reference:
@@ -194,7 +194,7 @@ def test_two_computations_of_a_jacobian_in_pinocchio_differ_by_less_than_half_th
     oracle: Oracle = robot.verifier.oracle()
     q, frame = robot.sample(20, 3), robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
-    size = magnitudes(plan, q, None, None, STILL_STATE)
+    size = magnitudes(plan, q, None, None, FIXED_BASE_STATE)
     for reference in Reference:
         alone = oracle.jacobians(QueryBatch((frame,), (q,), reference))
         among = oracle.jacobians(QueryBatch((frame, robot.link_names[0]), (q,), reference))[:, :1]

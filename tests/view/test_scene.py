@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of
+from urdfkin.kinematics.rotation import rotation_from_quaternion, rotation_from_rpy
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
 from urdfkin.view.scene import make_mesh, mesh_file, shapes
 from urdfkin.view.stage import acceleration_arrows, jacobian_arrows, velocity_ellipsoid
@@ -77,7 +77,7 @@ def test_velocities_of_unit_joint_velocities_lie_inside_the_ellipsoid_and_reach_
     angular: bool, x: FrameMotion
 ) -> None:
     shape = velocity_ellipsoid(x, 1.0, angular=angular)
-    R = rotation_of(np.roll(shape.wxyz, -1))
+    R = rotation_from_quaternion(np.roll(shape.wxyz, -1))
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     rates = np.random.default_rng(1).standard_normal((2000, J.shape[1]))
     rates /= np.linalg.norm(rates, axis=1, keepdims=True)
@@ -101,7 +101,7 @@ def test_a_flat_ellipsoid_is_visible_and_the_text_contains_the_results(x: FrameM
 
 
 def test_arrows_show_jacobian_columns_and_acceleration_parts_at_one_scale(x: FrameMotion) -> None:
-    rates = urdfkin.load("panda").rate_names
+    rates = urdfkin.load("panda").velocity_names
     arrows = jacobian_arrows(x, rates, 1.0, angular=False)
     vectors = arrows.points[:, 1] - arrows.points[:, 0]
     columns = x.jacobian[0, :3].T[[rates.index(name) for name in arrows.names]]

@@ -22,7 +22,7 @@ from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
-from urdfkin.model.configuration import checked
+from urdfkin.model.configuration import parse_finite
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.view.scene import Shape
 from urdfkin.view.server import new_server, open_page
@@ -96,7 +96,7 @@ def test_the_sliders_show_q_after_every_change_of_q(viewer: Viewer, units: str) 
         np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
         viewer.sliders.handles[seed].value = 0.25  # 0.25 degrees or radians
         np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
-        assert checked(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
+        assert parse_finite(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
     far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
     viewer.set_q(far)
     np.testing.assert_allclose(shown(viewer), far, rtol=1e-15)

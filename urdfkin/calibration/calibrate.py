@@ -44,12 +44,12 @@ from urdfkin.comparison.result import length
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
-from urdfkin.kinematics.inputs import rotation_defect, scalars
-from urdfkin.kinematics.rotation import polar_factor, rotation_of
-from urdfkin.model.configuration import checked
+from urdfkin.kinematics.inputs import as_finite, rotation_defect
+from urdfkin.kinematics.rotation import polar_factor, rotation_from_quaternion
+from urdfkin.model.configuration import parse_finite
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot, load
 from urdfkin.robot.trajectory import read_arrays, read_columns
 from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
@@ -296,7 +296,7 @@ def fit_model(
     check: bool = True,
 ) -> Calibration:
     """Fit as `calibrate` does, but also return implausible fits."""
-    robot = source if isinstance(source, Robot) else load(source)
+    robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
         make_table_model(source, names)
@@ -355,9 +355,11 @@ def _check_measured(
     """Check the arguments; return the path's coordinates (samples, n) and the measured poses."""
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
-        path_q = model.coupling.checked(q, "q")
+        path_q = model.coupling.parse(q, "q")
     else:
-        path_q = model.coupling.select(robot.tree, np.atleast_2d(checked(robot.tree, q, "q", look=False)))
+        path_q = model.coupling.select(
+            robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
+        )
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(
@@ -684,7 +686,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
             found=f"length {float(lengths[worst, 0]):.6g}",
         )
     T = np.broadcast_to(np.eye(4), (len(p), 4, 4)).copy()
-    T[:, :3, :3], T[:, :3, 3] = rotation_of(quat / lengths), p
+    T[:, :3, :3], T[:, :3, 3] = rotation_from_quaternion(quat / lengths), p
     return T
 
 
@@ -705,7 +707,7 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
 
 def as_pose_array(poses: ArrayLike) -> FloatArray:
     """Return poses (s, 4, 4) or positions (s, 3) as an array."""
-    array = scalars(poses, "poses")
+    array = as_finite(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array
     if array.ndim == 3 and array.shape[1:] == (4, 4):

@@ -67,7 +67,7 @@ from urdfkin.comparison.result import angle, length
 from urdfkin.errors import InputError
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import euler_of, log_rotation
-from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
@@ -456,7 +456,7 @@ def select_significant(
     x, C = changes.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative; the parameter then counts as significant.
-        sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
+        sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], MIN_DIVISOR))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
             break

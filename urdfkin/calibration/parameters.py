@@ -33,10 +33,10 @@ from urdfkin.compiled.plan import turned
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, steps_between
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
+from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.mimic import Coupling
-from urdfkin.model.path import ElementaryMotion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
 
 
@@ -129,7 +129,9 @@ class ParametricChain:
         amounts, factors = self._displacements(
             joint_values, self.initial_values if parameter_values is None else parameter_values
         )
-        T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
+        T, twists = self.path.pose_and_jacobian_from_frames(
+            self.path.frames(amounts) if frames is None else frames
+        )
         columns = np.zeros((len(joint_values), 6, len(self.parameters)))
         for k, motion in enumerate(self._parametric_motions):
             if motion.parameter is not None:
@@ -160,7 +162,7 @@ class ParametricChain:
         ]
         slid = max((float(np.abs(joint_values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
         total_length = self.characteristic_length + slid * len(slides)
-        return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * total_length
+        return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * total_length
 
 
 #: Largest angle (rad) between two axes of a table that are treated as parallel.
@@ -263,7 +265,7 @@ class CalibrationModel:
         motion = np.eye(4)
         for name, turns, axis in ORIGIN_PARAMETERS:
             if name in values:
-                motion = motion @ elementary(axis, turns, values[name])
+                motion = motion @ elementary_pose(axis, turns, values[name])
         return motion
 
 
@@ -340,10 +342,10 @@ def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[st
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
     parameters of the neighbouring moving joints have the same effect.
     """
-    path: FrameChain = chain(tree, tip, base)
+    path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
     builder.add_base_or_tool("base")
-    steps = steps_between(tree, tip, base)
+    steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
         only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)
@@ -396,7 +398,7 @@ def make_table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
                     ParametricMotion(axis, turns, builder.add_parameter(row.joint, cell, unit, cells[cell]))
                 )
             else:
-                motions.append(elementary(axis, turns, cells[cell]))
+                motions.append(elementary_pose(axis, turns, cells[cell]))
         joint = builder.make_joint_motion(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
         along, between = [*motions[:2], joint], motions[2:]
         standard = table.convention is DHConvention.STANDARD

@@ -30,7 +30,7 @@ from urdfkin.calibration.fit import (
 )
 from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
-from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
+from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, far_limits
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
@@ -216,10 +216,10 @@ def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], li
     like_degrees, outside = list[str](), list[str]()
     for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))
-        ends = far_outside(lower, upper)
+        ends = far_limits(lower, upper)
         is_far = float(column.min()) < ends[0] or float(column.max()) > ends[1]
         is_limited = math.isfinite(lower) and math.isfinite(upper)
-        if is_angle and largest > LARGEST_ANGLE and (is_far or not is_limited):
+        if is_angle and largest > MAX_PLAUSIBLE_ANGLE and (is_far or not is_limited):
             like_degrees.append(f"{name!r} ({largest:.4g})")
         elif is_far:
             outside.append(f"{name!r} ({largest:.4g}, limits {lower:.4g} to {upper:.4g})")

@@ -29,11 +29,11 @@ from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
-from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.chain import FrameChain, make_chain
+from urdfkin.model.configuration import sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree, pose
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot
 from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
@@ -112,10 +112,10 @@ def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "d
     replace the joint origins of the URDF. In other URDFs, such as the older ROS description, the joint
     origins are fitted. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
     """
-    robot = robot if isinstance(robot, Robot) else load(robot)
+    robot = as_robot(robot)
     origins = read_calibration(path, order)
     prefix = _prefix(robot)
-    calibrated = chain(make_calibrated_tree(origins), "tool0", "base")
+    calibrated = make_chain(make_calibrated_tree(origins), "tool0", "base")
     if _all_turn_about_z(robot, prefix):
         result = UpdatedURDF(robot, {prefix + joint: T for joint, T in origins.items()})
     else:
@@ -189,8 +189,8 @@ def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> 
 
     The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
     """
-    paths = [chain(make_calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = values_within([(-np.pi, np.pi)] * len(LINKS), _DISTANCE_SAMPLES)
+    paths = [make_chain(make_calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
+    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _DISTANCE_SAMPLES)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

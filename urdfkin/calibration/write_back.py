@@ -14,7 +14,7 @@ import numpy as np
 from urdfkin.comparison.diff import Changes, diff
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import log_rotation, quaternion_of, rpy_of
-from urdfkin.kinematics.roundings import ANGLE, EPS
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -22,7 +22,7 @@ from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.findings import Reporter, Severity
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.records import JointRecord, Vector
-from urdfkin.urdf.writer import before, numbers, with_attributes
+from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion
 from urdfkin.verify.certificate import Certificate
 
 #: Number of decimals of written metres and radians: the precision of a double near 1.
@@ -38,13 +38,13 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
-    if urdf is None or report.failed:
+    if urdf is None or report.has_errors:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     edits = list[Edit]()
     for name, T in origins.items():
-        if (joint := urdf.by_name.get(name)) is None:
+        if (joint := urdf.joints_by_name.get(name)) is None:
             raise InputError("the URDF has no such joint", found=repr(name))
         edits += _edits(report.data, joint, T)
     return mark + edited(report.data, edits)
@@ -57,12 +57,12 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     else:
         quaternion = quaternion_of(T[:3, :3])
         sign = math.copysign(1.0, float(quaternion @ np.asarray(joint.quaternion)))
-        values["quat_xyzw"] = numbers((sign * quaternion).round(_DECIMALS))
+        values["quat_xyzw"] = format_numbers((sign * quaternion).round(_DECIMALS))
     if joint.origin_element is not None:
-        return list(with_attributes(data, joint.origin_element, values))
+        return list(make_attribute_edits(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
     # A valid <joint> element contains at least the elements <parent> and <child>.
-    return [before(data, joint.element.children[0], f"<origin {written}/>")]
+    return [make_insertion(data, joint.element.children[0], f"<origin {written}/>")]
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
@@ -70,7 +70,9 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
-        word if abs(x - was) <= max(_ROUNDING, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
+        word
+        if abs(x - was) <= max(_ROUNDING, ANGLE_ROUNDINGS * EPS * abs(was))
+        else format_numbers([round(x, _DECIMALS)])
         for word, x, was in zip(words, new.tolist(), old, strict=True)
     )
 
@@ -84,7 +86,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     """
     roll, pitch, yaw = rpy_of(R).tolist()
     # If roll and yaw have the same axis, only their sum or difference is defined.
-    if math.cos(pitch) <= ANGLE * EPS:
+    if math.cos(pitch) <= ANGLE_ROUNDINGS * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -122,7 +124,7 @@ class UpdatedURDF:
     def displacements(self) -> dict[str, tuple[float, float]]:
         """The translation (m) and the rotation (rad) of each joint's origin."""
         tree = self.robot.tree
-        old = {name: tree.joints[tree.joint_index(name)].unlocked.T_parent_joint for name in self.origins}
+        old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {
             name: (
                 float(np.linalg.norm(T[:3, 3] - old[name][:3, 3])),

@@ -179,7 +179,7 @@ def status(context: click.Context, folder: Path) -> None:
     say(f"chunks: {finished:,} done, {missing:,} missing")
     _print_accuracy_progress(store, counts)
     for robot in failed[:_MOST_FAILED]:
-        say(f"  failed: {manifest.robots[robot][0].words}{_reason(store, robot)}")
+        say(f"  failed: {manifest.robots[robot][0].command_line}{_reason(store, robot)}")
     if len(failed) > _MOST_FAILED:
         say(f"  and {len(failed) - _MOST_FAILED:,} more")
     if missing and (seconds := _seconds_of_chunk(store, counts)) is not None:

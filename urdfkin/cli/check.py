@@ -33,26 +33,25 @@ from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
-from urdfkin.urdf.lint import Finding, Limits, Severity
-from urdfkin.urdf.lint.autofix import mend, patch
-from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
-from urdfkin.urdf.lint.formats import statistics as statistics_lines
-from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, page
-from urdfkin.urdf.lint.runner import Examined, examine, file_of
+from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
+from urdfkin.urdf.lint import Finding, Severity, SizeLimits
+from urdfkin.urdf.lint.autofix import fix_text, make_patch
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_statistics, format_summary
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, page
+from urdfkin.urdf.lint.runner import Examination, examine, find_local_path
 from urdfkin.urdf.lint.settings import (
-    INCLUDE,
-    Choice,
+    DEFAULT_INCLUDE,
+    FindingFilter,
     Settings,
     baseline_text,
-    codes,
-    collected,
+    find_codes,
+    find_files,
+    find_known_findings,
     find_settings,
-    known_before,
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import USD, Text, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import USD_SUFFIXES, UrdfText, is_usd, is_xacro, read_source
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -63,7 +62,8 @@ class CheckOutcome:
     """The results of all files.
 
     Attributes:
-        silenced: Findings that a comment in the file suppresses, each with the reason in the comment.
+        silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
+            comment.
         excerpts: For each finding, the faulty line of the file, and a line with carets below the fault.
         known: Number of findings that the baseline file suppresses.
         gone: Number of entries of the baseline file that no longer have a finding.
@@ -72,7 +72,7 @@ class CheckOutcome:
 
     files: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
-    silenced: list[tuple[Finding, str]] = field(default_factory=list)
+    silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     excerpts: list[str | None] = field(default_factory=list)
     errors: list[UrdfkinError] = field(default_factory=list)
     unchanged: int = 0
@@ -82,25 +82,25 @@ class CheckOutcome:
     patches: list[str] = field(default_factory=list)
     unsafe: int = 0
 
-    def add(self, file: str, found: Examined) -> None:
-        excerpts = Excerpts(found.data)
+    def add(self, file: str, found: Examination) -> None:
+        formatter = ExcerptFormatter(found.data)
         self.files.append(file)
         self.findings += found.findings
-        self.silenced += found.silenced
-        self.excerpts += [excerpts.of(finding) for finding in found.findings]
+        self.silenced_findings += found.silenced_findings
+        self.excerpts += [formatter.format(finding) for finding in found.findings]
 
 
 def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> None:
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
-        click.echo(as_json(findings, outcome.files, version, outcome.silenced))
+        click.echo(as_json(findings, outcome.files, version, outcome.silenced_findings))
     elif style == "sarif":
-        click.echo(as_sarif(findings, version, outcome.silenced))
+        click.echo(as_sarif(findings, version, outcome.silenced_findings))
     elif style == "github":
         if findings:
             command_lines(as_github(findings))
     elif statistics:
-        for line in statistics_lines(outcome.findings):
+        for line in format_statistics(outcome.findings):
             say(line)
         _print_summary(outcome)
     elif outcome.files or outcome.unchanged:
@@ -132,19 +132,19 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
 
 def _print_summary(outcome: CheckOutcome) -> None:
     counts = [
-        (len(outcome.silenced), "silenced by comments: {}"),
+        (len(outcome.silenced_findings), "silenced by comments: {}"),
         (outcome.unchanged, "unchanged files: {}"),
         (outcome.known, "already known: {}"),
         (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
     ]
     details = ", ".join(text.format(count) for count, text in counts if count)
-    say(summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
+    say(format_summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
 
 
 def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
     for code in sorted({finding.code for finding in fixed}):
         same_code = [finding for finding in fixed if finding.code == code]
-        turns = max(finding.fix.turns for finding in same_code if finding.fix)
+        turns = max(finding.fix.max_rotation for finding in same_code if finding.fix)
         lines = sorted({finding.line for finding in same_code})
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
@@ -234,7 +234,7 @@ limit_options = combine(
             default=limit.default,
             help=_LIMITS[limit.name],
         )
-        for limit in fields(Limits)
+        for limit in fields(SizeLimits)
     )
 )
 
@@ -303,8 +303,8 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     for word in files or ["."]:
         run.check_all(word, options["exclude"])
     outcome = run.outcome
-    if (baseline := run.choice.baseline) is not None:
-        outcome.known, outcome.gone = baseline.met, baseline.gone(outcome.files)
+    if (baseline := run.finding_filter.baseline) is not None:
+        outcome.known, outcome.gone = baseline.match_count, baseline.count_unmatched(outcome.files)
     if options["write_baseline"] is not None:
         _write_baseline(outcome, options["write_baseline"])
     if options["diff"]:
@@ -336,14 +336,16 @@ def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     how = load_options()
     look = partial(
         examine,
-        limits=Limits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(Limits)}),
+        limits=SizeLimits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(SizeLimits)}),
         mimic=how["mimic"],
         root_joint=how["root_joint"],
     )
-    codes_ = (_read_codes(options, "select") or frozenset(RULES | OF_OTHERS)) - _read_codes(options, "ignore")
+    codes_ = (_read_codes(options, "select") or frozenset(RULES | MJCF_AND_USD_RULES)) - _read_codes(
+        options, "ignore"
+    )
     return CheckRun(
         look=look,
-        choice=Choice(codes_, options["notes"], settings, baseline),
+        finding_filter=FindingFilter(codes_, options["notes"], settings, baseline),
         # A baseline stores the original severities.
         strict=options["strict"] and not writing,
         fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
@@ -357,7 +359,7 @@ def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
 
 def _read_codes(options: dict[str, Any], name: str) -> frozenset[str]:
     try:
-        return codes([part for word in options[name] for part in word.replace(",", " ").split()])
+        return find_codes([part for word in options[name] for part in word.replace(",", " ").split()])
     except UnknownNameError as error:
         raise click.UsageError(f"--{name}: {error}") from error
 
@@ -371,8 +373,8 @@ class CheckRun:
         accepts_all: True with --write-baseline. A finding then does not change the exit code.
     """
 
-    look: partial[Examined]
-    choice: Choice
+    look: partial[Examination]
+    finding_filter: FindingFilter
     strict: bool
     fold: bool
     fix: bool
@@ -385,9 +387,9 @@ class CheckRun:
     _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
     def check_all(self, word: str, exclude: Sequence[str]) -> None:
-        settings = self.choice.settings
+        settings = self.finding_filter.settings
         try:
-            files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
+            files = find_files(word, settings, settings.values.get("include", DEFAULT_INCLUDE), exclude)
         except SourceError as error:
             self.outcome.errors.append(error)
             return
@@ -409,18 +411,18 @@ class CheckRun:
         text = read_source(file, self.look.keywords["limits"].bytes, load_options()["xacro_args"])
         before = None
         if self.version is not None:
-            before = known_before(text, self.version, self.look)
+            before = find_known_findings(text, self.version, self.look)
             if before is None:
                 self.outcome.unchanged += 1
                 return
         if self.fix or self.diff:
-            text = self._fix(file, text, lambda: self.choice.again(text, before))
-        found = self.look(text, fold=self.fold, wanted=self.choice.of(text, before))
+            text = self._fix(file, text, lambda: self.finding_filter.make_independent_predicate(text, before))
+        found = self.look(text, fold=self.fold, is_reported=self.finding_filter.make_predicate(text, before))
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        suffixes = USD if is_usd(file) else _MJCF
+        suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
             self.outcome.unchanged += 1
             return
@@ -432,15 +434,15 @@ class CheckRun:
             warnings.simplefilter("ignore", UrdfWarning)
             try:
                 robot = load(file, verify=False, **usd)
-                found = tuple(finding for finding in robot.findings if finding.code in OF_OTHERS)
+                found = tuple(finding for finding in robot.findings if finding.code in MJCF_AND_USD_RULES)
             except UrdfError as error:
                 found = error.findings
-        text = Text(b"", file, file)
-        is_chosen = self.choice.of(text)
+        text = UrdfText(b"", file, file)
+        is_chosen = self.finding_filter.make_predicate(text)
         findings = tuple(self._with_severity(finding) for finding in found if is_chosen(finding))
         has_lines = any(one.width and one.file == file for one in findings)
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
-        self.outcome.add(file, Examined(text, data, None, findings, ()))
+        self.outcome.add(file, Examination(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and each file that it may include, is the same as in `version`.
@@ -455,26 +457,26 @@ class CheckRun:
         data = read_bytes(Path(file))
         return version.holds(data) and not any(os.fsencode(name) in data for name in version.gone)
 
-    def _fix(self, file: str, text: Text, choose: Any) -> Text:
-        path = None if text.entry is not None or is_xacro(text.source) else file_of(text)
+    def _fix(self, file: str, text: UrdfText, choose: Any) -> UrdfText:
+        path = None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
         if path is None:
             return text
-        mended = mend(text, self.look, lambda: self._safe(choose()))
-        for code, objection in mended.kept.items():
+        result = fix_text(text, self.look, lambda: self._safe(choose()))
+        for code, objection in result.unfixed_reasons.items():
             say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
-            self.outcome.to_fix += len(mended.fixed)
-            self.outcome.patches.append(patch(file, text.data, mended.text.data, harmless))
+            self.outcome.to_fix += len(result.fixed_findings)
+            self.outcome.patches.append(make_patch(file, text.data, result.text.data, harmless))
             chosen = choose()
             self.outcome.unsafe += sum(
                 chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe
-                for f in self.look(mended.text).findings
+                for f in self.look(result.text).findings
             )
             return text
-        if mended.fixed:
-            write_file(path, mended.text.data)
-            _say_fixed(file, mended.fixed)
-        return mended.text
+        if result.fixed_findings:
+            write_file(path, result.text.data)
+            _say_fixed(file, result.fixed_findings)
+        return result.text
 
     def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
         return lambda finding: (

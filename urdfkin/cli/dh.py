@@ -158,7 +158,7 @@ form_options = combine(
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
 #: If ROBOT is a Denavit-Hartenberg table, the command derives a new table only with one of these options.
-_DERIVING = ("base", "tip", "all_", *_CHOICES[1:])
+_DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from urdfkin.cli.options import locked_joints, locked_line
 from urdfkin.cli.output import Answer, check_of_path
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
@@ -35,7 +36,7 @@ from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
@@ -119,7 +120,10 @@ def _write_tables(request: DHRequest) -> Answer:
     checks = [verifier.table(table) if verifier.policy else None for table in tables]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
-        documents = [{**to_mapping(table), "checked": check_of_path(check)[0]} for table, check in results]
+        lock = locked_joints(request.robot)
+        documents = [
+            {**to_mapping(table), **lock, "checked": check_of_path(check)[0]} for table, check in results
+        ]
         text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(request, table, check) for table, check in results)
@@ -164,6 +168,7 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
 def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
     yield check_of_path(check)[0]
+    yield from _locked_lines(request)
     if request.format_ in _ROUNDED:
         yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")
     if request.unchanged is None and (
@@ -174,6 +179,12 @@ def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -
         yield from (f"hint: {line}" for line in published(request.robot.origin.source))
 
 
+def _locked_lines(request: DHRequest) -> list[str]:
+    form = request.format_ if request.format_ in _PRINTED else "terminal"
+    line = locked_line(request.robot)
+    return [TextDocument("", [line]).written(form).rstrip("\n")] if line else []
+
+
 # -- the whole tree ------------------------------------------------------------------------------------
 
 
@@ -182,15 +193,15 @@ def _write_tree(request: DHRequest) -> Answer:
     _require_format(request, "--tree", (*_TEXTS, "csv", "json"))
     parameters = tree_parameters(robot.tree)
     if format_ == "json":
-        text = json.dumps(as_mapping(parameters), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(as_mapping(parameters) | locked_joints(robot), indent=2, allow_nan=False) + "\n"
     elif format_ == "csv":
         text = as_csv(parameters)
     else:
         text = tree_document(parameters, request.units).written(format_)
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
-    check_line = str(check or check_of_path(None)[0])
+    check_line = "\n".join([str(check or check_of_path(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
-        q = draw(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
+        q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"\n{check_line}\n{printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)
@@ -223,11 +234,13 @@ def _compare(request: DHRequest, name: str) -> Answer:
     found = compare(chain, reference, tolerance, fit=request.fit, digits=last_digits(data))
     mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
-        text = json.dumps(_comparison(found, reference, mistake), indent=2, allow_nan=False) + "\n"
+        data = _comparison(found, reference, mistake) | locked_joints(request.robot)
+        text = json.dumps(data, indent=2, allow_nan=False) + "\n"
     else:
         document = comparison_document(found, request.units)
         hints = ["", f"hint: {mistake}"] if mistake else []
-        parts = [*notes, Strong(document.title), *document.parts, *hints]
+        lock = [line] if (line := locked_line(request.robot)) else []
+        parts = [*notes, *lock, Strong(document.title), *document.parts, *hints]
         text = TextDocument("", parts).written(request.format_)
     return _answer(request, text, 0 if found.passes else 1)
 
@@ -262,6 +275,7 @@ def _comparison(
         "tip_turned_at_most_rad": found.radians,
         "proven_tip_off_at_most_m": found.most_metres,
         "proven_tip_turned_at_most_rad": found.most_radians,
+        "proven_if": found.condition or None,
         "as_written_tip_off_at_most_m": found.written_metres,
         "as_written_tip_turned_at_most_rad": found.written_radians,
         "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},

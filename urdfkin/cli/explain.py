@@ -13,7 +13,7 @@ from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
 from urdfkin.urdf.findings import Rule
-from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, WIDTH, explain, find_rule, page
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, PROSE_WIDTH, RULES, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -37,7 +37,9 @@ def as_text(answer: str) -> str:
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
     for text, code in zip(prose, [*codes, ""], strict=True):
-        parts += [textwrap.fill(one, WIDTH, break_on_hyphens=False) for one in text.strip("\n").split("\n\n")]
+        parts += [
+            textwrap.fill(one, PROSE_WIDTH, break_on_hyphens=False) for one in text.strip("\n").split("\n\n")
+        ]
         parts.append(_indent(code))
     if "python" in kinds:
         parts += ["It runs after:", _indent("".join(code for _, code in _BLOCK.findall(_sections()[0])))]
@@ -74,7 +76,7 @@ def explain_command(topic: str | None) -> None:
       urdfkin explain 7.130
       urdfkin explain reference-frames
     """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
-    rules = (*RULES.values(), *OF_OTHERS.values())
+    rules = (*RULES.values(), *MJCF_AND_USD_RULES.values())
     if topic is None:
         for rule in rules:
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")

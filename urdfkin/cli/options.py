@@ -339,6 +339,13 @@ def locked_joints(robot: Robot) -> dict[str, Any]:
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
+def locked_line(robot: Robot) -> str:
+    """Return one line with the value of each locked joint, or "" if no joint is locked."""
+    units = {name: "rad" if robot.joints[name].original.kind.turns else "m" for name, _ in robot.origin.lock}
+    values = ", ".join(f"{name} at {value:.6g} {units[name]}" for name, value in robot.origin.lock)
+    return f"locked: {values}" if values else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """A robot, a frame and the values to compute with.
@@ -369,8 +376,8 @@ class Inputs:
         return (self.conversion or self.robot).coordinate_names
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
-        return (self.conversion or self.robot).rate_names
+    def velocity_names(self) -> tuple[str, ...]:
+        return (self.conversion or self.robot).velocity_names
 
     def converted(self) -> Inputs:
         if self.conversion is None:
@@ -463,7 +470,7 @@ def _read_values(
     from urdfkin.robot.trajectory import column_units
 
     named = conversion or robot
-    names = named.coordinate_names if letter == "q" else named.rate_names
+    names = named.coordinate_names if letter == "q" else named.velocity_names
     word, _, count = text.partition(":")
     if word == "random":
         n = _read_count(where, count) if count else _RANDOM_SAMPLES
@@ -475,7 +482,7 @@ def _read_values(
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
-    return layout.read(text, where)[None]
+    return layout.parse(text, where)[None]
 
 
 def _read_count(where: str, text: str) -> int:
@@ -586,9 +593,9 @@ def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tupl
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
     import numpy as np
 
-    from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of
+    from urdfkin.kinematics.rotation import rotation_from_quaternion, rotation_from_rpy
 
     T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
-    rotation = rotation_of if names is _QUATERNION else rotation_from_rpy
+    rotation = rotation_from_quaternion if names is _QUATERNION else rotation_from_rpy
     T[:, :3, :3], T[:, :3, 3] = rotation(rows[:, 3:]), rows[:, :3]
     return T

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ from urdfkin.cli.options import (
     conversion_of,
     digits_option,
     load_robot,
+    locked_joints,
+    locked_line,
     path_options,
     q_option,
     read_inputs,
@@ -32,6 +35,7 @@ from urdfkin.errors.escape import csv_cell
 if TYPE_CHECKING:
     from urdfkin.dh.structure import Structure, StructureKind
     from urdfkin.model.tree import FloatArray
+    from urdfkin.robot import Robot
 
 
 @click.command("chain", epilog="Example: urdfkin chain panda --base panda_link0 --tip panda_hand")
@@ -73,7 +77,7 @@ def chain_command(
         heads = ("joint", "kind", "axis z", "origin O [m]", "d to the next origin [m]")
         title = f"{path.robot}: {path.base} to {path.tip}, coordinates {names}"
         title += "" if convention is None else f", convention {convention}"
-        return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
+        return _with_locked_joints(TextDocument(title, [Table(heads, rows, left=5, names=(0,))]), loaded)
 
     def data() -> dict[str, Any]:
         converted = inputs.converted()
@@ -152,8 +156,12 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     screws = loaded.screws(tip, base, verify=False)
     check = check_screws(loaded.verifier, screws) if verify else None
     exact = (form for form in SCREW_FORMATS if form not in ("terminal", "markdown", "html"))
-    data = {form: partial(write_screws, screws, form, digits) for form in exact}
-    return Answer(partial(screws_document, screws, digits), data, *check_of_path(check))
+    data: dict[str, Callable[[], str]] = {form: partial(write_screws, screws, form, digits) for form in exact}
+    mapping = {**screws.as_mapping(), **locked_joints(loaded)}
+    data["json"] = lambda: json.dumps(mapping, indent=2) + "\n"
+    return Answer(
+        lambda: _with_locked_joints(screws_document(screws, digits), loaded), data, *check_of_path(check)
+    )
 
 
 @click.command("structure", epilog="Example: urdfkin structure ur5 --tip tool0")
@@ -190,13 +198,20 @@ def structure_command(
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
-        data = {"json": lambda: plain(found)}
-        return Answer(lambda: _structure_document(found), data, *check_of_path(check))
+        data = {"json": lambda: plain(found) | locked_joints(loaded)}
+        return Answer(
+            lambda: _with_locked_joints(_structure_document(found), loaded), data, *check_of_path(check)
+        )
     path = loaded.chain(tip, base)
     parameters = opw_of(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
     yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
     return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
+
+
+def _with_locked_joints(document: TextDocument, robot: Robot) -> TextDocument:
+    line = locked_line(robot)
+    return replace(document, parts=[line, *document.parts]) if line else document
 
 
 def _structure_document(found: Structure) -> TextDocument:
@@ -215,10 +230,10 @@ def _structure_document(found: Structure) -> TextDocument:
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    start = "measured from the point on the first axis that is nearest to the second axis"
+    point = ", ".join(six_digits(x, 1e-12) for x in found.reach_from)
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{bound}, {start}",
+        f"reach: {found.reached:.4g} m on samples{bound}, measured from ({point}) m, {found.reach_point}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]

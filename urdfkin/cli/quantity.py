@@ -169,7 +169,7 @@ def command_of(quantity: Quantity) -> click.Command:
             result = x.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
             if x.conversion is not None:
                 J = partial(x.robot.jacobian, x.q, x.frame, reference, base=x.base)
-                result = x.conversion.result(quantity.name, (x.q, x.v), result, J)
+                result = x.conversion.convert_result(quantity.name, (x.q, x.v), result, J)
         return _answer(x, quantity, result, reference if quantity.referred else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
@@ -216,7 +216,7 @@ def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
         "urdfkin": x.robot.certificate().urdfkin,
         **about,
         "coordinates": list(x.coordinate_names),
-        "rates": list(x.rate_names),
+        "rates": list(x.velocity_names),
         **times,
         **{letter: getattr(x, letter).tolist() for letter in letters},
         **x.settings,
@@ -225,7 +225,7 @@ def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.is_trajectory:
-        rates = [csv_cell(name) for name in x.rate_names]
+        rates = [csv_cell(name) for name in x.velocity_names]
         # The CSV of a Hessian has one line for each entry of the Jacobian, with the entry's derivatives.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
@@ -236,7 +236,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
     else:
         names = list(quantity.labels) or [f"T{i}{j}" for i in range(4) for j in range(4)]
         if quantity.columns:
-            several = product(names, *[x.rate_names] * (quantity.axes - 1))
+            several = product(names, *[x.velocity_names] * (quantity.axes - 1))
             names = [csv_cell(" ".join(words)) for words in several]
         yield [_TIME[x.t is not None], *names]
         samples = zip(_times(x), result.reshape(len(result), -1).tolist(), strict=True)
@@ -253,7 +253,7 @@ def _times(x: Inputs) -> Iterable[object]:
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
     if quantity.columns:
-        return _columns(quantity, x.rate_names, value)
+        return _columns(quantity, x.velocity_names, value)
     if not quantity.units:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
@@ -405,7 +405,7 @@ def _replay_command(x: Inputs, k: int, written: str) -> str:
     return f"{line} --as {written}"
 
 
-#: Copy of `urdfkin.kinematics.rotation.SEQUENCES`; the import of that module would slow --help down
+#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -544,7 +544,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             # At a singularity, the manipulability may have no derivative.
             yield from str(singularity).splitlines()
         else:
-            slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
+            slopes = zip(x.velocity_names, gradient[k].tolist(), strict=True)
             yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
     def data() -> dict[str, Any]:
@@ -564,7 +564,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     def lines() -> Iterator[list[object]]:
         sides = ("", " lower", " upper")
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
-        yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.rate_names)]
+        yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.velocity_names)]
         for k, (t, slopes) in enumerate(zip(_times(x), gradient.tolist(), strict=True)):
             numbers = [n for _, sides in _bounded(names, found, k) for n in sides]
             yield [t, *map(repr, numbers), *map(repr, slopes)]

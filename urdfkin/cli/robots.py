@@ -17,7 +17,7 @@ from urdfkin.cli.output import Answer, writes_answer
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_value
 from urdfkin.system.lazy_import import lazy_import
-from urdfkin.urdf.catalogue import Entry, catalogue
+from urdfkin.urdf.catalogue import CatalogueEntry, catalogue
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,9 +43,9 @@ def robots_command(family: str | None) -> Answer:
     heads = ("name", "family", "base", "tip")
     rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
     without_mimic = [
-        f"{entry.name}: mimic joints are loaded as free joints: {entry.reason}"
+        f"{entry.name}: mimic joints are loaded as free joints: {entry.mimic_problem}"
         for entry in entries
-        if entry.reason
+        if entry.mimic_problem
     ]
     table = Table(heads, rows, left=4, names=(0, 2, 3))
     data = {
@@ -55,15 +55,15 @@ def robots_command(family: str | None) -> Answer:
     return Answer(lambda: TextDocument("", [table, f"{len(entries)} robots", *without_mimic]), data)
 
 
-def _as_dict(entry: Entry) -> dict[str, object]:
+def _as_dict(entry: CatalogueEntry) -> dict[str, object]:
     return {
         "name": entry.name,
         "family": entry.family,
         "path": str(entry.path),
         "limbs": {limb: list(ends) for limb, ends in entry.limbs.items()},
         "mimic": entry.mimic,
-        "reason": entry.reason,
-        "own": entry.own,
+        "mimic_problem": entry.mimic_problem,
+        "is_bundled": entry.is_bundled,
     }
 
 
@@ -184,9 +184,9 @@ def _convention_data(conversion: Conversion) -> dict[str, Any]:
         "title": convention.title,
         "joints": list(conversion.joint_names),
         "q": list(conversion.coordinate_names),
-        "v": list(conversion.rate_names),
+        "v": list(conversion.velocity_names),
         "quaternion": convention.quaternion,
-        "six_vectors": convention.six,
+        "six_vectors": convention.six_vectors,
         "evidence": convention.evidence,
         "sources": list(convention.sources),
         "note": convention.note,
@@ -194,11 +194,11 @@ def _convention_data(conversion: Conversion) -> dict[str, Any]:
 
 
 def _conversion_code(start: Conversion, end: Conversion) -> Answer:
-    from urdfkin.model.conventions import reordering
+    from urdfkin.model.conventions import find_reordering
 
     a, b = start.convention.name, end.convention.name
-    found = {letter: reordering(letter, start, end) for letter in "qv"}
-    names = {"q": end.coordinate_names, "v": end.rate_names}
+    found = {letter: find_reordering(letter, start, end) for letter in "qv"}
+    names = {"q": end.coordinate_names, "v": end.velocity_names}
 
     def code() -> Iterator[str]:
         for letter, one in found.items():

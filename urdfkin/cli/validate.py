@@ -28,7 +28,7 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_remedy
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def _study(
     """
     import numpy as np
 
-    from urdfkin.model.configuration import draw_base
+    from urdfkin.model.configuration import draw_base_motion
     from urdfkin.validation.accuracy import accuracy_study
     from urdfkin.validation.robot_input import make_robot_input
     from urdfkin.validation.store import FailedStudy
@@ -116,7 +116,7 @@ def _study(
         robot = make_robot_input(source, **how)
         if is_same := sha256 in (None, robot.sha256):
             rng = np.random.default_rng([settings.seed, 1])
-            base = draw_base(settings.samples, rng) if settings.moving_base else None
+            base = draw_base_motion(settings.samples, rng) if settings.moving_base else None
             return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
             "the robot file has changed since the validation read the file",
@@ -239,7 +239,7 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or examples()]
+    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or example_robots()]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
         stoppable() as stop,

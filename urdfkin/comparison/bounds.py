@@ -25,8 +25,8 @@ import numpy as np
 
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT, NOT_ZERO
-from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS, MIN_DIVISOR
+from urdfkin.model.configuration import ASSUMED_LIMIT, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     FramePair,
@@ -78,7 +78,7 @@ class DistanceSearch:
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame, in A's zero configuration.
-        self.T_root_base = alignment.X @ alignment.b.homes[alignment.base[1]]
+        self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
         #: Whether the base link belongs to the same rigid body as the root link, for each robot.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
@@ -90,7 +90,7 @@ class DistanceSearch:
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
         tree = self.robots[name.startswith("b:")].tree
-        widest = math.pi if tree.joints[tree.joint_index(name[2:])].kind.turns else WIDEST
+        widest = math.pi if tree.joints[tree.joint_index(name[2:])].kind.turns else ASSUMED_LIMIT
         if math.isinf(low) and math.isinf(high):
             return -widest, widest
         return (high - 2.0 * widest if math.isinf(low) else low), (
@@ -109,7 +109,7 @@ class DistanceSearch:
         q_b = np.tile(neutral(tree_b), (len(z), 1))
         for step in self.alignment.steps:
             joint = tree_a.joints[step.a]
-            if joint.kind.nq > 1 and not step.unlike:
+            if joint.kind.nq > 1 and not step.kind_difference:
                 at, to = tree_a.q_index[step.a], tree_b.q_index[step.b]
                 own = q_a[:, at : at + joint.kind.nq]
                 converted = own if step.conversion is None else step.conversion(joint.kind, own)
@@ -118,7 +118,7 @@ class DistanceSearch:
             if joint.nq == 1:
                 q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
         for name, line in self.variables.leaders.items():
-            q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.at(values)
+            q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.evaluate(values)
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
@@ -131,9 +131,9 @@ class DistanceSearch:
             tree, q = (self.robots[0].tree, q_a) if name.startswith("a:") else (self.robots[1].tree, q_b)
             z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
         low, high = self.ends.T
-        rounding = EPS * MIMIC_LIMIT * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        rounding = EPS * MIMIC_LIMIT_ROUNDINGS * (1.0 + np.maximum(np.abs(low), np.abs(high)))
         alike = all(
-            (np.abs(expected - q) <= EPS * MIMIC_LIMIT * (1.0 + np.abs(expected))).all()
+            (np.abs(expected - q) <= EPS * MIMIC_LIMIT_ROUNDINGS * (1.0 + np.abs(expected))).all()
             for expected, q in zip(self.configurations(z), (q_a, q_b), strict=True)
         )
         return alike and bool((low - rounding <= z).all() and (z <= high + rounding).all())
@@ -156,7 +156,7 @@ class DistanceSearch:
         if not self.base_fixed[0]:
             link = self.alignment.base[0]
             moved = computed(a, q_a, [a.tree.link_frames[link]])
-            T_root_base = moved @ inverse(self.alignment.a.homes[link]) @ T_root_base
+            T_root_base = moved @ inverse(self.alignment.a.zero_poses[link]) @ T_root_base
         return Ts_a, T_root_base @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
     def distances_at(
@@ -249,7 +249,7 @@ class DistanceSearch:
         }
         trees = self.robots[0].tree, self.robots[1].tree
         for step in (self.alignment.steps[i] for i in steps):
-            if step.unlike == "kind":
+            if step.kind_difference == "kind":
                 names |= {f"a:{trees[0].joints[step.a].name}", f"b:{trees[1].joints[step.b].name}"}
         return [i for i, name in enumerate(self.names) if name in names]
 
@@ -309,7 +309,7 @@ class Boxes:
         """
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
-        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, MIN_DIVISOR)[:, np.newaxis]
         across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 

@@ -24,7 +24,7 @@ from urdfkin.model.mechanisms.mechanism import (
     pose_difference,
     variables_of,
 )
-from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import COARSE_GRID, FINE_GRID, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
@@ -390,7 +390,7 @@ def _choices_error(
             return (
                 f"`orders`: the joints {order} are not consecutive, or this order changes the robot's motion"
             )
-        b = b.reordered(names)
+        b = b.reorder(names)
     return None
 
 
@@ -458,7 +458,7 @@ def _interval_errors(
     if claim["lower"] > most or claim["radians_seen"] > widest:
         yield f"frame {claim['frame']}: a lower bound is larger than the upper bound"
     metres, radians = most - rounding[0], widest - rounding[1]
-    for grid in (COARSE, FINE):
+    for grid in (COARSE_GRID, FINE_GRID):
         proven = math.inf, math.inf
         if not search.unbounded:
             proven = upper_bounds(search.alignment, search.variables, frame, grid)

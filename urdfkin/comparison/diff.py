@@ -26,13 +26,13 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.numbers import parse_float
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load, robot_of
+from urdfkin.robot.loading import as_robot, robot_of
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.urdf.sources import Source, Text, is_usd
+from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
@@ -156,7 +156,7 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
         >>> print(found.changes[0])
         joint shoulder_pan_joint: limit lower -6.28318530718 -> -3.14159265359
     """
-    old, new = (source if isinstance(source, Robot) else load(source) for source in (a, b))
+    old, new = as_robot(a), as_robot(b)
     if _format(old) != _format(new):
         return _across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))
@@ -207,7 +207,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             for tree, name in zip(result.trees, (pair.a, pair.b), strict=True)
         )
         if a.kind.nv == b.kind.nv and a.kind.turns == b.kind.turns:
-            single = SINGLE if result.single else 0.0
+            single = SINGLE_ROUNDOFF if result.single else 0.0
             for one in limit_differences(a, b, result.rounding[1], single):
                 yield from _change_of(one)
     # The readers of MJCF and USD add the link "world" as the root.
@@ -336,5 +336,5 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 
 def _quiet_robot(tree: KinematicTree) -> Robot:
-    text = Text(to_urdf(tree).encode(), tree.name, tree.name)
+    text = UrdfText(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)

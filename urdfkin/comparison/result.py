@@ -17,7 +17,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import rpy_of
-from urdfkin.model.configuration import checked, neutral
+from urdfkin.model.configuration import neutral, parse_finite
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
@@ -27,7 +27,7 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Tolerance,
     Variables,
-    limits,
+    joint_limits,
     pose_difference,
     tolerance_of,
 )
@@ -497,7 +497,7 @@ class Sameness(Displayable):
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
         (tree_a, tree_b), joints = self.trees, {one.a: one for one in self.joints}
-        q = checked(tree_a, q, "q")
+        q = parse_finite(tree_a, q, "q")
         out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
         for i, joint in enumerate(tree_a.joints):
             if (one := joints.get(joint.name)) is None:
@@ -681,7 +681,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
         if frame.differs and (is_mount or tables or _is_tool(alignment, frame)):
             alignment.frames[k] = frame.as_tool()
             if is_mount and rounding.holds(
-                *pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b])
+                *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
                 continue  # The listed change of the base pose causes this displacement.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
@@ -706,7 +706,9 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
         if (frame.a in before_a and frame.b in before_b)
         or (
             (frame.a in before_a | beside_a and frame.b in before_b | beside_b)
-            and rounding.holds(*pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b]))
+            and rounding.holds(
+                *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
+            )
         )
     }
 
@@ -788,23 +790,28 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
     for tree, joints, which in ((tree_a, alignment.only_a, "A"), (tree_b, alignment.only_b, "B")):
         alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
         ordered += [Difference(place, f"only in {which}") for place in alone]
-    have = {tree_a.links[frame.a] for frame in alignment.frames}
-    for link in tree_a.links:
-        if link in tree_b.links and link not in have and _on_matched_bodies(alignment, link):
-            ours, theirs = (_carrier(tree, link) for tree in (tree_a, tree_b))
-            ordered.append(Difference(f"link {link}", "carried by", ours, theirs))
+    have = {frame.a for frame in alignment.frames}
+    links_of_b = {label: link for link, label in enumerate(alignment.b.labels)}
+    for link, label in enumerate(alignment.a.labels):
+        other = links_of_b.get(label)
+        if other is not None and link not in have and _on_matched_bodies(alignment, link, other):
+            ours, theirs = _carrier(tree_a, link), _carrier(tree_b, other)
+            ordered.append(Difference(f"link {tree_a.links[link]}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
-def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
+def _on_matched_bodies(alignment: Alignment, link: int, other: int) -> bool:
     return all(
-        mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
-        for mechanism, only in ((alignment.a, alignment.only_a), (alignment.b, alignment.only_b))
+        mechanism.body_of[index] not in {mechanism.body_of[j + 1] for j in only}
+        for mechanism, only, index in (
+            (alignment.a, alignment.only_a, link),
+            (alignment.b, alignment.only_b, other),
+        )
     )
 
 
-def _carrier(tree: KinematicTree, link: str) -> str:
-    path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
+def _carrier(tree: KinematicTree, link: int) -> str:
+    path = [tree.joints[i] for i in tree.path(link) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
 
@@ -813,16 +820,16 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
     step, tree_a, tree_b = alignment.steps[i], alignment.a.tree, alignment.b.tree
     joint, other = tree_a.joints[step.a], tree_b.joints[step.b]
     place = f"joint {joint.name}"
-    if step.unlike == "kind":
+    if step.kind_difference == "kind":
         return [Difference(place, "kind", joint.kind.value, other.kind.value)]
-    if step.unlike:
-        ends = ("fixed", "moves") if step.unlike == "a" else ("moves", "fixed")
+    if step.kind_difference:
+        ends = ("fixed", "moves") if step.kind_difference == "a" else ("moves", "fixed")
         return [Difference(place, "fixed", *ends)]
     some = []
     if step.differs and step.kind in ("planar", "floating"):
         some.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
     elif step.differs:
-        detail = "alone" if step.other is not step.axis else ""
+        detail = "alone" if step.axis_b is not step.axis_a else ""
         some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
     if i in variables.rules:
         some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
@@ -848,7 +855,7 @@ def remarks(
     """
     some = list[Difference]()
     for step in alignment.steps:
-        if not step.unlike:
+        if not step.kind_difference:
             a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
             zero = (1, 0.0) if as_written else (step.sense, step.offset)
             some += limit_differences(a, b, tolerance.angle, single, zero)
@@ -894,8 +901,8 @@ def limit_differences(
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:
         yield Difference(place, "kind", a.kind.value, b.kind.value)
-    back = sorted(sense * (end - offset) for end in limits(b))
-    ours = limits(a)
+    back = sorted(sense * (end - offset) for end in joint_limits(b))
+    ours = joint_limits(a)
     if not all(_close(x, y, tolerance, single) for x, y in zip(ours, back, strict=True)):
         detail = "converted" if sense < 0 or offset else ""
         yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)

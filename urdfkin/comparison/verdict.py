@@ -32,8 +32,8 @@ from urdfkin.comparison.result import (
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
-from urdfkin.kinematics.roundings import EPS, SINGLE
-from urdfkin.model.configuration import WIDEST, narrowed_ranges
+from urdfkin.kinematics.roundings import EPS, SINGLE_ROUNDOFF
+from urdfkin.model.configuration import ASSUMED_LIMIT, range_reductions
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
@@ -51,17 +51,17 @@ from urdfkin.model.mechanisms.mechanism import (
     tolerance_of,
     variables_of,
 )
-from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot
 from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Maximum number of frames whose upper bound is computed on the finer grid `FINE`.
+#: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: For the unchanged models, also the maximum number of frames whose largest distance is searched.
 FARTHEST = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
@@ -115,7 +115,7 @@ def same(
         >>> bool(found)
         False
     """
-    robots = tuple(source if isinstance(source, Robot) else load(source) for source in (a, b))
+    robots = (as_robot(a), as_robot(b))
     joint_map = _parse_map(map)
     whole_number(boxes, "boxes", 0)
     if within is not None:
@@ -224,7 +224,7 @@ class Comparator:
                 alignment,
                 variables,
                 self.tolerance,
-                SINGLE if single else 0.0,
+                SINGLE_ROUNDOFF if single else 0.0,
                 as_written=verdict is Verdict.UP_TO_SINGLE,
             ),
             joints=tuple(
@@ -250,7 +250,7 @@ class Comparator:
             narrowed=tuple(
                 f"{which}: {words}"
                 for which, tree in zip("AB", self.trees, strict=True)
-                for words in narrowed_ranges(tree)
+                for words in range_reductions(tree)
             ),
             checked=Confirmation("not asked", reason="the bounds are not computed yet"),
             trees=self.trees,
@@ -325,19 +325,21 @@ class Comparator:
         `same` ignores a small rounding difference at each joint. These differences add up along the path. If
         an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
         and the frame. The bound of the distance therefore holds only while each joint of `unlimited` travels
-        at most `WIDEST`.
+        at most `ASSUMED_LIMIT`.
         """
         pairs = [
             (step.kind, pair)
             for step, pair in zip(alignment.steps, variables.pairs, strict=True)
             if pair is not None
         ]
-        travels = [WIDEST if math.isinf(travel) else travel for _, travel in _travels(alignment, variables)]
+        travels = [
+            ASSUMED_LIMIT if math.isinf(travel) else travel for _, travel in _travels(alignment, variables)
+        ]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
         slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
         turns = sum(pair.rounding for kind, pair in pairs if kind != "prismatic")
-        metres = alignment.deepest * self.tolerance.distance
-        radians = alignment.deepest * self.tolerance.angle + turns
+        metres = alignment.depth * self.tolerance.distance
+        radians = alignment.depth * self.tolerance.angle + turns
         return metres + slides + radians * reach, radians
 
     def _intervals(self, alignment: Alignment, variables: Variables) -> tuple[Interval, ...]:
@@ -380,7 +382,7 @@ class Comparator:
             widest = max(different, key=lambda k: uppers[k])
             if widest in fine:
                 break
-            uppers[widest] = upper_bounds(alignment, variables, frames[widest], FINE)
+            uppers[widest] = upper_bounds(alignment, variables, frames[widest], FINE_GRID)
             fine.add(widest)
         return uppers
 
@@ -413,7 +415,9 @@ class Comparator:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
         attained, frame = max(worst, key=lambda pair: pair[0][0])
-        upper = (math.inf, math.inf) if search.unbounded else upper_bounds(written, variables, frame, FINE)
+        upper = (
+            (math.inf, math.inf) if search.unbounded else upper_bounds(written, variables, frame, FINE_GRID)
+        )
         return self._interval(written, frame, search, attained, (upper[0] + metres, upper[1] + radians))
 
     def _interval(
@@ -518,7 +522,7 @@ def _with_idle_joints_fixed(
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
     children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
     joints = tuple(
-        Lock(joint, 0.0).fixed()
+        Lock(joint, 0.0).make_fixed_joint()
         if _never_moves(joint)
         and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
         else joint
@@ -568,9 +572,9 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     the other model's root, this link coincides with that root.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
-        return inverse(b.homes[link])
+        return inverse(b.zero_poses[link])
     if (root := b.labels[0]) in a.labels and not a.body_of[link := a.labels.index(root)]:
-        return a.homes[link]
+        return a.zero_poses[link]
     return IDENTITY
 
 
@@ -671,7 +675,7 @@ class JointComparison:
 
     def differences(self) -> Iterator[JointDifference]:
         joints, links = self.trees[0].joints, self.trees[0].links
-        starts = [m.homes[link] for m, link in zip(self.mechanisms, self.start, strict=True)]
+        starts = [m.zero_poses[link] for m, link in zip(self.mechanisms, self.start, strict=True)]
         if not all(self.tolerance.holds(*pose_difference(IDENTITY, T)) for T in (self.base, *starts)):
             yield JointDifference(f"link {links[self.start[0]]}", "base", None, "at another place")
         compared = set[int]()
@@ -714,7 +718,7 @@ class JointComparison:
         ]
         steps = [self.steps.get(i) for i in moving[0][1]]
         name = f"link {trees[0].links[link]}"
-        partners = [None if step is None or step.unlike else step.b for step in steps]
+        partners = [None if step is None or step.kind_difference else step.b for step in steps]
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
@@ -742,7 +746,7 @@ class JointComparison:
             )
             # A shifted link origin also shifts the axis, so the axes are compared in the link's frame.
             if axis and origin:
-                pair = tuple(screw.moved(inverse(T)) for screw, T in zip(pair, poses, strict=True))
+                pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
                     self._beyond_bound(
                         joint, "axis", *self._axis_difference(step, *pair), sum(bound) + sum(bounds)
@@ -812,8 +816,8 @@ class JointComparison:
             yield JointDifference(name, "", None, why)
             return
         for T, other in (
-            [mechanism.homes[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
-            [mechanism.homes[path[0] + 1] for mechanism, path in ends],
+            [mechanism.zero_poses[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
+            [mechanism.zero_poses[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
                 why = "the planar or floating joint that carries this link has different frames in A and B"

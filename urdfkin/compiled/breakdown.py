@@ -36,7 +36,7 @@ from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.kinematics.number_kinds import array_equations as eq
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
@@ -118,7 +118,7 @@ def acceleration_breakdown(
     v: FloatArray,
     a: FloatArray,
     reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
-    base: FloatArray = STILL_STATE,
+    base: FloatArray = FIXED_BASE_STATE,
     *,
     out: FloatArray | None = None,
     threads: int | None = None,

@@ -34,7 +34,7 @@ from urdfkin.compiled.plan import (
 from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.validators import whole_number
-from urdfkin.model.base_motion import STILL_STATE, against_gravity
+from urdfkin.model.base_motion import FIXED_BASE_STATE, subtract_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -136,7 +136,7 @@ def imus(
     **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes."""
-    how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
+    how["base"] = subtract_gravity(how.get("base", FIXED_BASE_STATE), gravity)
     program = program_of(plan, turned=True)
     return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
 
@@ -149,7 +149,7 @@ def _compute(
     reference: Reference,
     shape: tuple[int, ...],
     *,
-    base: FloatArray = STILL_STATE,
+    base: FloatArray = FIXED_BASE_STATE,
     out: FloatArray | None = None,
     threads: int | None = None,
     read: bool = False,
@@ -206,7 +206,7 @@ def _lists(
     task[KernelArgs.N], task[KernelArgs.WIDTH] = 1, len(result)
     for place, x in zip(_PLACES, inputs, strict=False):
         task[place] = x[0 if len(x) == 1 else i].tolist()
-    if inputs[0] is STILL_STATE:
+    if inputs[0] is FIXED_BASE_STATE:
         task[KernelArgs.BASE] = 0
     return task
 
@@ -255,13 +255,13 @@ def task_of(
     task[KernelArgs.STAGE] = address(stage) if staged else 0
     for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
         task[place], task[of_place] = address(x), 0 if len(x) == 1 else x.shape[1]
-    if inputs[0] is STILL_STATE:
+    if inputs[0] is FIXED_BASE_STATE:
         task[KernelArgs.BASE] = 0
     return task, (memory, stage)
 
 
 def _is_large(base: FloatArray) -> bool:
-    return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
+    return base is not FIXED_BASE_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled.python_numbers import LARGE, Number
-from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, pose
 
@@ -224,7 +224,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 def turned(joint: Joint) -> FloatArray:
     """Return the pose (4, 4) that rotates the z axis to the joint's axis."""
-    return pose(axis_aligning(joint.axis) if joint.kind.has_axis else None)
+    return pose(rotation_with_z_axis(joint.axis) if joint.kind.has_axis else None)
 
 
 def _flat(T: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from urdfkin.compiled import preload
 from urdfkin.compiled.kernel_cache import compiling
 from urdfkin.compiled.plan import CompiledTree, KernelArgs
 from urdfkin.model.configuration import warn_of_degrees
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
@@ -95,7 +95,7 @@ class PreparedFrame:
         # The object contains addresses of this process, so unpickling calls `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
-    def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
+    def placement(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
         """Return T_world_frame (4, 4) by eq. 7.77.
 
         >>> import urdfkin
@@ -107,7 +107,9 @@ class PreparedFrame:
             return pose
         return self._robot.placement(q, self.frame, out=out, verify=self.verify, threads=1)
 
-    def velocity(self, q: Given, v: Given, out: FloatArray | None = None) -> FloatArray:
+    def velocity(
+        self, q: ConfigurationLike, v: ConfigurationLike, out: FloatArray | None = None
+    ) -> FloatArray:
         """Return the velocity (6,), [linear; angular], m/s and rad/s, by eq. 7.127 and 7.128.
 
         >>> import urdfkin
@@ -119,7 +121,7 @@ class PreparedFrame:
             return six
         return self._robot.velocity(q, v, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
-    def jacobian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
+    def jacobian(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
         """Return the Jacobian (6, nv) by eq. 7.85.
 
         >>> import urdfkin
@@ -131,7 +133,7 @@ class PreparedFrame:
             return J
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
-    def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
+    def hessian(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
         """Return the Hessian (6, nv, nv), the derivative of the Jacobian with respect to each joint's motion.
 
         >>> import urdfkin
@@ -143,7 +145,9 @@ class PreparedFrame:
             return H
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
-    def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
+    def acceleration(
+        self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike, out: FloatArray | None = None
+    ) -> FloatArray:
         """Return the classical acceleration (6,), m/s^2 and rad/s^2, by eq. 7.129 and 7.130.
 
         The six numbers are [linear; angular].
@@ -159,7 +163,7 @@ class PreparedFrame:
             q, v, a, self.frame, self.reference, out=out, verify=self.verify, threads=1
         )
 
-    def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
+    def _first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
         """Create a quantity's fast function and call the fast function.
 
         Return None if the fast function cannot be used, saves no time, or returns None.

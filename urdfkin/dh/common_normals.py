@@ -26,7 +26,15 @@ import numpy as np
 
 from urdfkin.dh.table import DHRow, DHTable, angle_difference, between_axes, cleaned_angle
 from urdfkin.errors import RangeError
-from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUMMED, WRITTEN
+from urdfkin.kinematics.roundings import (
+    ANGLE_ROUNDINGS,
+    AXIS_ROUNDINGS,
+    CONSTANT_POSE_ROUNDINGS,
+    DECIMAL_ROUNDINGS,
+    EPS,
+    FILE_ROUNDINGS,
+    LENGTH_ROUNDINGS,
+)
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
@@ -148,10 +156,10 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
     (0.0, 0.076, -5e-12)
     """
-    if abs(length) <= max(SUMMED * EPS * reach, noise):
+    if abs(length) <= max(LENGTH_ROUNDINGS * EPS * reach, noise):
         return 0.0
     short = float(f"{length:.12g}")
-    return short if abs(length - short) <= DIGITS * EPS * reach else float(length)
+    return short if abs(length - short) <= DECIMAL_ROUNDINGS * EPS * reach else float(length)
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +332,11 @@ def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
 
 def theta_like(theta: float, reference: float) -> float:
     """Return the reference if the two angles differ only by rounding; otherwise theta."""
-    return reference if abs(angle_difference(theta, reference)) <= ANGLE * EPS else cleaned_angle(theta)
+    return (
+        reference
+        if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS
+        else cleaned_angle(theta)
+    )
 
 
 #: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
@@ -374,14 +386,16 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
     (63.7, 4.0)
     """
-    computed = (AXES + CONSTANT * joints) * EPS
-    return PoseTolerance(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
+    computed = (AXIS_ROUNDINGS + CONSTANT_POSE_ROUNDINGS * joints) * EPS
+    return PoseTolerance(
+        computed + FILE_ROUNDINGS * joints * EPS, max(LENGTH_ROUNDINGS * EPS * reach, computed * length)
+    )
 
 
 def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
     return [
         pose_tolerance(joints, float(length), reach)
-        for joints, length in zip(chain.folded, chain.lengths, strict=True)
+        for joints, length in zip(chain.pose_counts, chain.lengths, strict=True)
     ]
 
 

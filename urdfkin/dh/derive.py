@@ -36,7 +36,7 @@ from urdfkin.dh.table import (
     is_identity,
 )
 from urdfkin.errors import InputError
-from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -231,7 +231,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
 
 def _clean_rotation(T: FloatArray) -> None:
     R = T[:3, :3]
-    R[np.abs(R) <= ENTRY * EPS] = 0.0
+    R[np.abs(R) <= ENTRY_ROUNDINGS * EPS] = 0.0
 
 
 def _clean(T: FloatArray, reach: float, noise: float = 0.0) -> None:
@@ -284,7 +284,7 @@ def _first_like(
     """Copy theta, and d if it is 0, from the first row of `like`; change the base to compensate."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
-    if abs(angle) > ANGLE * EPS or offset:
+    if abs(angle) > ANGLE_ROUNDINGS * EPS or offset:
         base = base @ along_axis(angle, offset)
         _clean_rotation(base)
     return base, (row.theta, d - offset)
@@ -302,7 +302,7 @@ def _last_like(
     T_tip = along_axis(theta, d) @ between_axes(last.a, last.alpha) @ tool
     tool = np.linalg.inv(along_axis(row.theta, offset) @ between_axes(row.a, row.alpha)) @ T_tip
     _clean(tool, like.span or 1.0)
-    if np.abs(tool - np.eye(4)).max() <= ANGLE * EPS:
+    if np.abs(tool - np.eye(4)).max() <= ANGLE_ROUNDINGS * EPS:
         tool = np.eye(4)
     return row.theta, offset, AxisTransform(a=row.a, alpha=row.alpha), tool
 

@@ -19,7 +19,7 @@ from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.snapping import check_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
 #: Tables with a larger difference of cells (rad, or relative to the reach) describe different robots.
@@ -145,7 +145,7 @@ def dh_table(
         InputError: an option has an invalid value, or the path contains a planar or floating joint.
         RangeError: the square of a length is outside the range of doubles.
     """
-    exact = chain(tree, tip, base)
+    exact = make_chain(tree, tip, base)
     # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))

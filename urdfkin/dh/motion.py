@@ -17,7 +17,7 @@ from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.dh.convert import free_tree
 from urdfkin.dh.table import DHTable
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -29,7 +29,7 @@ def _compiled_tree(table: DHTable) -> CompiledTree:
 
 
 def jacobian(
-    table: DHTable, q: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    table: DHTable, q: ConfigurationLike, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
     """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (equation 7.85).
 
@@ -41,7 +41,10 @@ def jacobian(
 
 
 def velocity(
-    table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    table: DHTable,
+    q: ConfigurationLike,
+    v: ConfigurationLike,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128).
 
@@ -52,7 +55,11 @@ def velocity(
 
 
 def acceleration(
-    table: DHTable, q: Given, v: Given, a: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
+    table: DHTable,
+    q: ConfigurationLike,
+    v: ConfigurationLike,
+    a: ConfigurationLike,
+    reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130).
 
@@ -66,8 +73,8 @@ def acceleration(
     )
 
 
-def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
-    return table.coupling.checked(rates, what) @ table.coupling.matrix.T
+def _joint_derivatives(table: DHTable, rates: ConfigurationLike, what: str) -> FloatArray:
+    return table.coupling.parse(rates, what) @ table.coupling.matrix.T
 
 
 def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:

@@ -58,7 +58,7 @@ _TABLE_KEYS = (
     *("coordinates", "rows"),
 )
 #: These keys contain information about a table, and do not change the table.
-_NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
+_NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
 _BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
 

@@ -25,11 +25,11 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
-from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
-from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
+from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
@@ -38,7 +38,7 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    frozen,
+    freeze,
     pose,
 )
 
@@ -99,7 +99,7 @@ class ProductOfExponentials(Displayable):
         """
         R, p = self.M[:3, :3], self.M[:3, 3]
         w, v = self.space[:, :3], self.space[:, 3:]
-        return frozen(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
+        return freeze(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
 
     @cached_property
     def coupling(self) -> Coupling:
@@ -109,7 +109,7 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
+        return make_coupling([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def points(self) -> FloatArray:
@@ -127,7 +127,7 @@ class ProductOfExponentials(Displayable):
             found.append(here)
         return np.array(found).reshape(-1, 3)
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose of the tip in the base for `q` (..., coordinates).
 
         The coordinates are in the order of `coupling.names`.
@@ -155,7 +155,7 @@ class ProductOfExponentials(Displayable):
         """
         steps, R, p = list[FloatArray | ElementaryMotion](), np.eye(3), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
-            along = axis_aligning(screw[:3] if joint.kind.turns else screw[3:])
+            along = rotation_with_z_axis(screw[:3] if joint.kind.turns else screw[3:])
             steps += [pose(R.T @ along, R.T @ (point - p)), ElementaryMotion(2, joint.kind.turns)]
             R, p = along, point
         return Path((*steps, pose(R.T @ self.M[:3, :3], R.T @ (self.M[:3, 3] - p))))
@@ -171,9 +171,9 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
         True
         """
-        return 2.0 * of_rows(len(self.joints))
+        return 2.0 * table_roundings(len(self.joints))
 
-    def rounding(self, q: Given) -> FloatArray:
+    def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.
 
         >>> import urdfkin
@@ -248,7 +248,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
         rows.append(np.concatenate([z, np.cross(p, z)] if joint.kind.turns else [np.zeros(3), z]) + 0.0)
     joints = tuple(ScrewJoint(one.name, one.kind, one.mimic, one.limit) for one in path.joints)
     ends = path.robot, path.base, path.tip
-    return ProductOfExponentials(joints, frozen(frames[-1]), frozen(np.array(rows).reshape(-1, 6)), *ends)
+    return ProductOfExponentials(joints, freeze(frames[-1]), freeze(np.array(rows).reshape(-1, 6)), *ends)
 
 
 def _rigid(M: FloatArray) -> FloatArray:
@@ -323,13 +323,13 @@ def screws_from(
             )
         S[i, 3:] -= pitch * S[i, :3]
         named.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
-    return ProductOfExponentials(tuple(named), frozen(T), frozen(S), robot, base_frame, tip_frame)
+    return ProductOfExponentials(tuple(named), freeze(T), freeze(S), robot, base_frame, tip_frame)
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     """Make screws from plain data with the keys M and "space" or "body"."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
-    check_keys(data, known, "the table of screws")
+    check_keys([key for key in data if key != "lock"], known, "the table of screws")
     frame = next((key for key in ("space", "body") if key in data), None)
     if frame is None:
         raise InputError(

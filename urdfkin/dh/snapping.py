@@ -32,10 +32,10 @@ from urdfkin.dh.table import (
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
-from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
-from urdfkin.model.chain import FrameChain, chain, steps_between
-from urdfkin.model.configuration import axis_range, values_within
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
+from urdfkin.model.chain import FrameChain, joints_between, make_chain
+from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
@@ -60,10 +60,10 @@ def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
     """Return the chain with snapped angles, and each change with the index of the changed constant pose."""
-    exact = chain(tree, tip, base)
+    exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
-    path = chain(snapped_tree, tip, base)
-    changes = _changes_of_origins(steps_between(tree, tip, exact.base), rotations)
+    path = make_chain(snapped_tree, tip, base)
+    changes = _changes_of_origins(joints_between(tree, tip, exact.base), rotations)
     constants = list(path.constants)
     names = [*(joint.name for joint in path.joints), path.tip]
     for k, A in enumerate(constants):
@@ -71,10 +71,10 @@ def snap_chain(
         if angle:
             changes.append((k, _change(exact, k + 1, f"direction of {names[k]}", angle)))
     joints = [
-        replace(joint, T_previous_joint=frozen(A))
+        replace(joint, T_previous_joint=freeze(A))
         for joint, A in zip(path.joints, constants[:-1], strict=True)
     ]
-    return replace(path, joints=tuple(joints), T_last_tip=frozen(constants[-1])), changes
+    return replace(path, joints=tuple(joints), T_last_tip=freeze(constants[-1])), changes
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
@@ -99,7 +99,7 @@ def snap_report(
     for change in changes:
         for name in change.sliders:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
-    travels = {row.joint: travel(row.limit) for row in table.rows}
+    travels = {row.joint: largest_value(row.limit) for row in table.rows}
     metres = sum((change.tip for change in changes), 0.0)
     metres += sum(rate * travels[name] for name, rate in per_metre.items())
     q = samples_within_limits(table)
@@ -120,7 +120,7 @@ def snap_report(
 
 def samples_within_limits(table: DHTable) -> FloatArray:
     ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
-    return values_within([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
+    return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
@@ -141,7 +141,7 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
         angle = float(rotation_angle(T[:3, :3], joint.T_parent_joint[:3, :3]))
         if angle > 0.0:
             joints[i] = replace(joint, T_parent_joint=T)
-        if angle > TURN * EPS:
+        if angle > ROTATION_ROUNDINGS * EPS:
             rotations[joint.name] = angle
     return replace(tree, joints=tuple(joints)), rotations
 
@@ -167,7 +167,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
-    if sine <= max(math.sin(tolerance), TURN * EPS):
+    if sine <= max(math.sin(tolerance), ROTATION_ROUNDINGS * EPS):
         phi = 0.0
         psi = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
         if R[2, 2] < 0.0:
@@ -177,7 +177,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     pose = np.array(A)
     pose[:3, :3] = _product(((2, phi), (0, tilt), (2, psi)), tolerance)
     angle = float(rotation_angle(pose[:3, :3], R))
-    return pose, (angle if angle > TURN * EPS else 0.0)
+    return pose, (angle if angle > ROTATION_ROUNDINGS * EPS else 0.0)
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
@@ -185,7 +185,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
-        is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
+        is_round = abs(angle - twelfth) <= max(tolerance, ROTATION_ROUNDINGS * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
             turn[np.abs(turn) < EPS] = 0.0  # In doubles, cos(pi/2) is not 0.
@@ -236,18 +236,13 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is DHConvention.STANDARD else k
 
 
-def travel(limit: Limit | None) -> float:
-    """Return the largest distance of a prismatic joint from zero (m); 1 m without limits."""
-    return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
-
-
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     """Return (joint, cell, deviation) for angles near multiples of 15 degrees, and lengths near 0."""
     noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
             deviation = abs(angle - nearest_twelfth(angle))
-            if ANGLE * EPS < deviation <= _LARGEST_NOISE:
+            if ANGLE_ROUNDINGS * EPS < deviation <= _LARGEST_NOISE:
                 noisy.append((row.joint, name, deviation))
         for name, length in (("a", row.a), ("d", row.d)):
             if 0.0 < abs(length) <= _LARGEST_NOISE * table.span:

@@ -28,13 +28,12 @@ import numpy as np
 from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.snapping import travel
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import axis_range, values_within
-from urdfkin.model.path import elementary
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
+from urdfkin.model.path import elementary_pose
+from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
 #: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
@@ -83,8 +82,17 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    `reach` is an upper bound (m) of the tip's distance from the point of axis 1 that is nearest to axis 2.
-    `reached` is the largest such distance in sampled configurations.
+    `reach` is an upper bound (m) of the tip's distance from the point `reach_from`, within the joint limits.
+    `reached` is the largest such distance in sampled configurations. `reach_from` is a point in the base
+    frame (m), and does not depend on the configuration. `reach_point` describes the point in words:
+
+    - The first two joints are revolute, and their axes are not nearly parallel (more than 0.02 rad): the
+      point of the first axis that is nearest to the second axis.
+    - The first two axes are nearly parallel, the second joint is prismatic, or only one joint moves: the
+      point of the first axis that is nearest to the base's origin.
+    - The first joint is prismatic, or no joint moves: the base's origin.
+
+    A prismatic joint without limits makes `reach` infinite; its samples are within `ASSUMED_LIMIT` of zero.
     """
 
     robot: str
@@ -96,6 +104,8 @@ class Structure:
     kinds: tuple[StructureKind, ...]
     reach: float
     reached: float
+    reach_from: tuple[float, ...]
+    reach_point: str
     solvers: tuple[str, ...]
 
 
@@ -105,7 +115,7 @@ def structure(screws: ProductOfExponentials) -> Structure:
     kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
     tips, jacobian = _sample_tips(screws)
-    origin = _origin(screws)
+    origin, reach_point = _origin(screws)
     return Structure(
         screws.robot,
         screws.base_frame,
@@ -116,6 +126,8 @@ def structure(screws: ProductOfExponentials) -> Structure:
         tuple(kinds),
         _reach_bound(screws, origin),
         float(np.linalg.norm(tips - origin, axis=-1).max()),
+        tuple(origin.tolist()),
+        reach_point,
         tuple(_solvers(letters, kinds, pairs)),
     )
 
@@ -222,33 +234,32 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 # -- reach ---------------------------------------------------------------------------------------------
 
 
-def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """Return the point of the first axis that is nearest to the second axis.
-
-    If one joint is prismatic, or if the axes are nearly parallel, return `screws.points[0]`.
-    """
-    if not screws.joints:
-        return np.zeros(3)
-    if len(screws.joints) > 1 and screws.joints[0].kind.turns and screws.joints[1].kind.turns:
+def _origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
+    """Return the point from which the reach is measured, in the base frame (m), and its description."""
+    if not screws.joints or not screws.joints[0].kind.turns:
+        return np.zeros(3), "the base's origin"
+    if len(screws.joints) > 1 and screws.joints[1].kind.turns:
         z, y = _axis(screws, 0), _axis(screws, 1)
         cross = np.cross(z, y)
         if np.linalg.norm(cross) > NEAR_ANGLE:
             between = screws.points[1] - screws.points[0]
             along = float(np.linalg.det([between, y, cross]) / (cross @ cross))
-            return np.asarray(screws.points[0] + along * z)
-    return np.asarray(screws.points[0])
+            nearest = np.asarray(screws.points[0] + along * z)
+            return nearest, "the point of the first axis that is nearest to the second axis"
+    return np.asarray(screws.points[0]), "the point of the first axis that is nearest to the base's origin"
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance (m) from `origin`, a point of the first axis, within the joint limits.
+    """Bound the tip's distance (m) from the point `origin`, within the joint limits.
 
     The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
-    next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
+    next axis that is nearest to the previous vertex. Travel of prismatic joints is added. The bound is
+    infinite if a prismatic joint has no limits.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
-            total += travel(joint.limit) if joint.limit else math.inf
+            total += largest_value(joint.limit) if is_bounded(joint.limit) else math.inf
             continue
         z = _axis(screws, i)
         nearest = screws.points[i] + z * float(z @ (point - screws.points[i]))
@@ -259,9 +270,9 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
-    ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
-    values = values_within(ranges, _SAMPLES)
-    return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
+    ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
+    values = sample_uniform(ranges, _SAMPLES)
+    return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,11 +297,11 @@ class Opw:
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
         T = (
-            elementary(2, True, t[0])
-            @ elementary(1, True, t[1] + t[2])
-            @ elementary(2, True, t[3])
-            @ elementary(1, True, t[4])
-            @ elementary(2, True, t[5])
+            elementary_pose(2, True, t[0])
+            @ elementary_pose(1, True, t[1] + t[2])
+            @ elementary_pose(2, True, t[3])
+            @ elementary_pose(1, True, t[4])
+            @ elementary_pose(2, True, t[5])
         )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1
@@ -319,7 +330,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = values_within([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
+    q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
     expected, best, reason = free.placement(q), None, ""
     for reference in _candidate_tables(path):
         try:

@@ -30,11 +30,11 @@ from urdfkin.dh.units import Units, units_of
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
-from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_rigid
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, freeze, is_bounded, is_rigid
 from urdfkin.system.lazy_import import hook
 
 
@@ -190,7 +190,7 @@ def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     (0.5, 3.141592653589793)
     """
     tilt_of_x = max(abs(T[0, 1]), abs(T[0, 2]))
-    if tilt_of_x > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+    if tilt_of_x > ANGLE_ROUNDINGS * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     return float(T[0, 3]), cleaned_angle(math.atan2(T[2, 1], T[2, 2]))
 
@@ -218,7 +218,7 @@ def cleaned_angle(angle: float) -> float:
     """Wrap an angle into (-pi, pi]; a multiple of pi/12 with a rounding error becomes exact."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
-    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
+    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE_ROUNDINGS * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
@@ -273,7 +273,7 @@ class SnapReport:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
         metres: Guaranteed bound of the tip's displacement (metres). The bound holds if each prismatic joint
-            is within its limits, or within 1 m of zero if the joint has no limits.
+            is within its limits, or within 10 m of zero if the joint has no limits.
         radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
         measured_metres: Largest displacement of the tip in sampled configurations (metres).
@@ -426,7 +426,7 @@ class DHTable(Displayable):
         >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
+        return make_coupling([(row.joint, row.mimic, row.kind) for row in self.rows])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -450,6 +450,16 @@ class DHTable(Displayable):
         """
         return any(row.beta != 0.0 for row in self.rows)
 
+    @property
+    def unlimited(self) -> tuple[str, ...]:
+        """Names of the prismatic joints without limits. Bounds assume that these joints travel at most 10 m.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited
+        ()
+        """
+        return tuple(row.joint for row in self.rows if not row.kind.turns and not is_bounded(row.limit))
+
     @cached_property
     def span(self) -> float:
         """Sum (metres) of all |a|, all |d| and the length of the tool, with all joints at zero.
@@ -461,7 +471,7 @@ class DHTable(Displayable):
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
-    def rounding(self, q: Given) -> FloatArray:
+    def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
         The bound is the length of the chain times the sum of all rounding errors of rows and angles
@@ -476,9 +486,9 @@ class DHTable(Displayable):
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
         angle = values[..., turns].sum(axis=-1)
         lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
-        return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
+        return np.asarray(EPS * (table_roundings(len(self.rows)) + angle) * lever)
 
-    def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
+    def tolerance(self, q: ConfigurationLike) -> tuple[FloatArray, FloatArray]:
         """Return bounds (...,), in m and rad, of the difference between the table's and the URDF's tip pose.
 
         The bounds cover rounding errors, and the effect of rounded angles if `snap` is not None.
@@ -490,7 +500,7 @@ class DHTable(Displayable):
         (True, True)
         """
         metres = self.rounding(q)
-        radians = EPS * of_rows(len(self.rows)) + np.zeros_like(metres)
+        radians = EPS * table_roundings(len(self.rows)) + np.zeros_like(metres)
         if self.snap is None:
             return metres, radians
         values = self.coupling.values(q)
@@ -499,7 +509,7 @@ class DHTable(Displayable):
 
     # -- placement -----------------------------------------------------------------------------------
 
-    def frames(self, q: Given | None = None) -> FloatArray:
+    def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
@@ -530,7 +540,7 @@ class DHTable(Displayable):
             steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
 
         Args:
@@ -550,7 +560,7 @@ class DHTable(Displayable):
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
-    pose = frozen(T)
+    pose = freeze(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
             "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"

@@ -38,9 +38,9 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
-from urdfkin.kinematics.roundings import EPS, of_rows
-from urdfkin.model.path import elementary
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.kinematics.roundings import EPS, table_roundings
+from urdfkin.model.path import elementary_pose
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
 
 _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1, JointKind.FIXED: 2}
 
@@ -105,7 +105,7 @@ class TreeParameters:
         The estimate does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
-        return of_rows(1 + longest) + self.left_out / EPS
+        return table_roundings(1 + longest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
         """Return the (..., joints) path length (metres) from the root to each link at `q`.
@@ -154,7 +154,7 @@ class TreeParameters:
             constant = along_axis(row.gamma, row.b) @ between_axes(row.d, row.alpha, row.beta)
             T = T @ constant @ along_axis(row.theta, row.r)
             if row.sigma < 2:
-                T = T @ elementary(2, row.sigma == 0, values[..., j])
+                T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
         return np.asarray(frames @ self.T_frame_link)
 
@@ -180,9 +180,9 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
         np.linalg.inv(along_axis(*offsets.get(j, (0.0, 0.0)))) @ link.T_link_axis.T
         for j, link in enumerate(links)
     ]
-    T_frame_link = frozen(np.reshape(poses, (-1, 4, 4)))
+    T_frame_link = freeze(np.reshape(poses, (-1, 4, 4)))
     left_out = max((link.left_out for link in links), default=0.0)
-    return TreeParameters(tree.name, tree.links[0], rows, frozen(lengths), T_frame_link, left_out)
+    return TreeParameters(tree.name, tree.links[0], rows, freeze(lengths), T_frame_link, left_out)
 
 
 @dataclass(frozen=True, slots=True)

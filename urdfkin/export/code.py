@@ -15,7 +15,7 @@ from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.naming import all_safe, comment_name, comment_text, title
 from urdfkin.export.proof import Proof, prove
-from urdfkin.model.configuration import coordinate_names, rate_names
+from urdfkin.model.configuration import coordinate_names, velocity_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
@@ -139,7 +139,7 @@ def unverified_code(
     reference: Reference,
     name: str,
 ) -> FrameCode:
-    coordinates, rates = coordinate_names(tree), rate_names(tree)
+    coordinates, rates = coordinate_names(tree), velocity_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     names = {"q": coordinates, "v": rates, "a": rates, "s": joints}
     return FrameCode(

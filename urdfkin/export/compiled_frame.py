@@ -34,8 +34,8 @@ from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.export.c import InputLayout, advance, c_file, fill_template, reserve
 from urdfkin.export.code import FrameCode, unverified_code
 from urdfkin.export.proof import CHECKED
-from urdfkin.model.configuration import draw, warn_of_degrees
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration import draw_samples, warn_of_degrees
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.cache import cache_folder, get, put
@@ -231,7 +231,9 @@ class CompiledFrame:
         # Memory addresses are not valid in another process, so unpickling creates a new object.
         return self._robot.compiled, (self.frame, self.reference)
 
-    def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
+    def placement(
+        self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
         """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
 
         >>> import urdfkin
@@ -244,7 +246,12 @@ class CompiledFrame:
         return self._compute_batch("placement", (q,), out, threads)
 
     def velocity(
-        self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
+        self,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        out: FloatArray | None = None,
+        *,
+        threads: int | None = None,
     ) -> FloatArray:
         """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
 
@@ -257,7 +264,9 @@ class CompiledFrame:
             return one
         return self._compute_batch("velocity", (q, v), out, threads)
 
-    def jacobian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
+    def jacobian(
+        self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
         """Return the Jacobian (..., 6, nv): eq. 7.85.
 
         >>> import urdfkin
@@ -270,7 +279,12 @@ class CompiledFrame:
         return self._compute_batch("jacobian", (q,), out, threads)
 
     def jacobian_rate(
-        self, q: Given, v: Given, out: FloatArray | None = None, *, threads: int | None = None
+        self,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        out: FloatArray | None = None,
+        *,
+        threads: int | None = None,
     ) -> FloatArray:
         """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126.
 
@@ -283,7 +297,9 @@ class CompiledFrame:
             return one
         return self._compute_batch("jacobian rate", (q, v), out, threads)
 
-    def hessian(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
+    def hessian(
+        self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
+    ) -> FloatArray:
         """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
 
         >>> import urdfkin
@@ -297,9 +313,9 @@ class CompiledFrame:
 
     def acceleration(
         self,
-        q: Given,
-        v: Given,
-        a: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
         out: FloatArray | None = None,
         *,
         threads: int | None = None,
@@ -315,7 +331,7 @@ class CompiledFrame:
             return one
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
-    def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
+    def _first(self, name: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
         with compiling, importing:
             from urdfkin.compiled.machine.single import arrays_are_known, called
 
@@ -349,17 +365,17 @@ class CompiledFrame:
         except NoCompilerError:
             return None
         task.argtypes, task.restype = [ctypes.c_void_p], ctypes.c_int64
-        drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+        drawn = draw_samples(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
         call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
         result = call.in_shape(self._run_call(task, row, call, None, 1))
         verifier.check(row, call, result, verifier.policy_of_call(None))
         return task
 
-    def _call(self, inputs: Sequence[Given]) -> Call:
+    def _call(self, inputs: Sequence[ConfigurationLike]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
 
     def _compute_batch(
-        self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
+        self, name: str, inputs: Sequence[ConfigurationLike], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         row = QUANTITIES[name]
         if (task := self._machine_code(row)) is None:
@@ -380,7 +396,7 @@ class CompiledFrame:
         return call.in_shape(result) if out is None else out
 
     def _are_plain(
-        self, inputs: Sequence[Given], row: Quantity, out: FloatArray
+        self, inputs: Sequence[ConfigurationLike], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without a copy or a check of values.
 

@@ -107,7 +107,7 @@ def exact_plan(
 
 
 def _aligning(axis: Vector, z: float) -> Matrix:
-    """Return a rotation matrix whose third column is `axis`, by the formula in `axis_aligning`.
+    """Return a rotation matrix whose third column is `axis`, by the formula in `rotation_with_z_axis`.
 
     The vector `axis` has unit length, and `z` is its third component as a float.
     """

@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Sequence
 from functools import wraps
 from typing import Any
 
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 
 #: A number in an equation: a float, or a node of the graph.
 Number = Any
@@ -84,7 +84,7 @@ class Graph:
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
         self.place, self.equation = 0, ""
-        self.chapter: Any = bound(decorate=self._record_numbers)
+        self.chapter: Any = bind_equations(decorate=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
         return self.made(letter, place)

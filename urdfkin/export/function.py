@@ -32,7 +32,7 @@ from urdfkin.kinematics.roundings import (
     SINGLE_POLYNOMIAL,
     SINGLE_SMALLEST,
 )
-from urdfkin.model.recursion import State
+from urdfkin.model.recursion import LinkState
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
@@ -178,7 +178,7 @@ def function_of(
     )
 
 
-def _name(place: int, state: State) -> None:
+def _name(place: int, state: LinkState) -> None:
     """Name the numbers of a link's state after the textbook's symbols, for example `w2_z`."""
     named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):

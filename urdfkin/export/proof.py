@@ -19,8 +19,8 @@ import numpy as np
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function, single_bounds
 from urdfkin.export.naming import comment_name, comment_text
-from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
-from urdfkin.model.configuration import draw
+from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST_NORMAL
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -28,14 +28,7 @@ from urdfkin.system.lazy_import import own_version
 from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.numbers import (
-    DIGITS,
-    conversion,
-    enough_digits,
-    exact,
-    precision,
-    read_exact,
-)
+from urdfkin.verify.exact.numbers import DIGITS, conversion, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
@@ -154,7 +147,7 @@ def compare(
     Raise VerificationError if a difference exceeds the error bound.
     """
     checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
-    drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+    drawn = draw_samples(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
@@ -173,7 +166,7 @@ def _vectors(
     """Return the test vectors, and the largest bound of each quantity in single precision."""
     tree = verifier.tree
     link = tree.frame_link(frame)
-    drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
+    drawn = draw_samples(tree, VECTORS, np.random.default_rng(1), with_special=False)
     inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (drawn.q, drawn.v, drawn.a))
     part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTORS))
     within, single, largest = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
@@ -208,7 +201,7 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
-    scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
+    scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST_NORMAL), 0.0)
     shape = (n, 1, *function.shape)
     within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
     return within, scale

@@ -17,7 +17,7 @@ from typing import Any, assert_never
 
 from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry, JointMotion
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.recursion import Column, Matrix, Number, Recursion, State, Vector
+from urdfkin.model.recursion import Column, LinkState, Matrix, Number, Recursion, Vector
 from urdfkin.model.reference import Reference
 
 _Z: Vector = (0, 0, 1)
@@ -36,25 +36,25 @@ class NumberKind:
     sine_cosine: Callable[[Number], tuple[Number, Number]]
     root: Callable[[Number], Number]
     begin_step: Callable[[int], None] = lambda place: None
-    end_step: Callable[[int, State], None] = lambda place, state: None
+    end_step: Callable[[int, LinkState], None] = lambda place, state: None
 
 
 class TreeRecursion(Recursion):
     """The forward recursion along one path; `end` is the state of the frame.
 
-    If `own` is True, the motion of each link is computed in the axes of the link's frame. Otherwise, it is
-    computed in the axes of the world frame. An input that is not needed consists of zeros. `turns` are
+    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. Otherwise, it
+    is computed in the axes of the world frame. An input that is not needed consists of zeros. `turns` are
     rotation matrices from the axes of each frame to the axes of the previous frame.
     """
 
     def __init__(
-        self, plan: CompiledTree, kind: NumberKind, inputs: Sequence[Sequence[Number]], *, own: bool
+        self, plan: CompiledTree, kind: NumberKind, inputs: Sequence[Sequence[Number]], *, own_axes: bool
     ) -> None:
-        super().__init__(kind.chapter, own)
+        super().__init__(kind.chapter, own_axes)
         self.plan, self.kind, self.inputs = plan, kind, inputs
         self.turns: list[Matrix] = []
-        self.states: list[State] = []
-        state = State()
+        self.states: list[LinkState] = []
+        state = LinkState()
         for i in range(len(plan.steps)):
             kind.begin_step(i)
             state = self._move(i, self._carry(state, plan.geometry[i].tolist()))
@@ -65,34 +65,34 @@ class TreeRecursion(Recursion):
         kind.end_step(len(self.states), self.end)
         kind.begin_step(len(self.states) + 1)
 
-    def turned(self, s: State, S: Matrix) -> State:
+    def rotate_frame(self, s: LinkState, S: Matrix) -> LinkState:
         self.turns.append(S)
-        return super().turned(s, S)
+        return super().rotate_frame(s, S)
 
-    def _carry(self, s: State, row: Sequence[float]) -> State:
+    def _carry(self, s: LinkState, row: Sequence[float]) -> LinkState:
         R, d = row[: Geometry.OFFSET], row[Geometry.OFFSET : Geometry.MULTIPLIER]
         x, y, z = _without_rounding(R[0:3]), _without_rounding(R[3:6]), _without_rounding(R[6:9])
-        return self.turned(self.carried(s, _without_rounding(d)), (x, y, z))
+        return self.rotate_frame(self.translate_frame(s, _without_rounding(d)), (x, y, z))
 
     def _about_z(self, angle: Number) -> Matrix:
         found: Matrix = self.eq.about_z(*self.kind.sine_cosine(angle), 0, 1)
         return found
 
-    def _move(self, i: int, s: State) -> State:
+    def _move(self, i: int, s: LinkState) -> LinkState:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         match motion := JointMotion(kind):
             case JointMotion.PLANAR:
-                return self.planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
+                return self.after_planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
             case JointMotion.FLOATING:
                 quaternion = q[at + 3 : at + 7]
                 length = self.kind.root(sum(c * c for c in quaternion))
                 S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
-                return self.floating(s, q[at:], S, v[rate_at:], a[rate_at:])
+                return self.after_floating(s, q[at:], S, v[rate_at:], a[rate_at:])
             case JointMotion.TURN:
                 value, *rates = self._own_values(i)
-                return self.revolute(s, _Z, self._about_z(value), *rates)
+                return self.after_revolute(s, _Z, self._about_z(value), *rates)
             case JointMotion.SLIDE:
-                return self.prismatic(s, _Z, *self._own_values(i))
+                return self.after_prismatic(s, _Z, *self._own_values(i))
             case _:
                 assert_never(motion)
 
@@ -131,7 +131,7 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 
 
 def placement(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    end = TreeRecursion(plan, kind, inputs, own=False).end
+    end = TreeRecursion(plan, kind, inputs, own_axes=False).end
     rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
     return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
 
@@ -150,19 +150,19 @@ def acceleration(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: R
 
 def jacobian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the frame's Jacobian (7.85), row by row."""
-    path = TreeRecursion(plan, kind, inputs, own=False)
+    path = TreeRecursion(plan, kind, inputs, own_axes=False)
     return _by_row(path.jacobian(path.end, path.columns, plan.nv, reference))
 
 
 def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the Jacobian's time derivative (7.126), row by row."""
-    path = TreeRecursion(plan, kind, inputs, own=False)
+    path = TreeRecursion(plan, kind, inputs, own_axes=False)
     return _by_row(path.jacobian_rate(path.end, path.columns, plan.nv, reference))
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the Hessian (the terms of 7.126 before their sum), row by row."""
-    path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
+    path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):
         for row, x in enumerate(six):
@@ -172,7 +172,7 @@ def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Refere
 
 def _recursion(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> TreeRecursion:
     # The reference WORLD needs the position p, which is computed in world axes.
-    return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
+    return TreeRecursion(plan, kind, inputs, own_axes=not reference.at_world)
 
 
 def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angular: Vector) -> list[Number]:

@@ -14,37 +14,37 @@ from typing import Any
 from urdfkin.kinematics import equations
 
 #: Names of the vector operations from which all equations are composed.
-VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
+VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
-def bound(
+def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
     """Copy all functions of `equations`; the copies use the operations `vectors`, such as `plus` and `cross`.
 
-    >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
+    >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
     7.0
     """
-    return SimpleNamespace(**rebound(equations, decorate=decorate, others=vectors))
+    return SimpleNamespace(**rebind_functions(equations, decorate=decorate, replacements=vectors))
 
 
-def rebound(
-    *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], others: Mapping[str, Any]
+def rebind_functions(
+    *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions. An entry of `others` replaces the function or
-    the module of the same name. `decorate` is applied to each copy. List a module after the modules whose
-    functions it uses.
+    A copy calls other copies instead of the original functions. An entry of `replacements` replaces the
+    function or the module of the same name. `decorate` is applied to each copy. List a module after the
+    modules whose functions it uses.
     """
     copies: dict[str, Any] = {}
     for module in modules:
         names = dict(vars(module))
-        names |= {name: x for name, x in {**others, **copies}.items() if name in names}
+        names |= {name: x for name, x in {**replacements, **copies}.items() if name in names}
         for name, function in vars(module).items():
             if isinstance(function, FunctionType) and function.__module__ == module.__name__:
                 copy = FunctionType(function.__code__, names, name, function.__defaults__)
                 copy.__doc__, copy.__module__ = function.__doc__, function.__module__
-                names[name] = copies[name] = others.get(name) or decorate(copy)
+                names[name] = copies[name] = replacements.get(name) or decorate(copy)
     return copies

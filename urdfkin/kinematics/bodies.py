@@ -37,7 +37,14 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
+from urdfkin.kinematics.inputs import (
+    FloatArray,
+    as_finite,
+    as_matrices,
+    as_rotations,
+    as_unit_vectors,
+    as_vectors,
+)
 from urdfkin.kinematics.number_kinds import array_equations as eq
 from urdfkin.kinematics.rotation import (
     NEAREST,
@@ -65,7 +72,7 @@ class MovingFrame:
 
     def __post_init__(self) -> None:
         for entry in fields(self):
-            check = rotations if entry.name == "R_0_1" else vectors
+            check = as_rotations if entry.name == "R_0_1" else as_vectors
             array = np.array(check(getattr(self, entry.name), entry.name), order="C")
             array.setflags(write=False)
             object.__setattr__(self, entry.name, array)
@@ -99,7 +106,7 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
 
-def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
+def relative_pose(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
     """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1."""
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
@@ -142,15 +149,15 @@ class AccelerationParts:
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
     """Return p_0 = d_01 + R p_1, the position (..., 3) of a point of frame 1 in frame 0 (7.58)."""
-    p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
+    p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, as_vectors(p_1, "p_1"))
     return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return the terms of p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if v_1 = 0)."""
-    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
+    p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
-    relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
+    relative = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
     return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
 
 
@@ -161,9 +168,9 @@ def point_acceleration(
 
     For a point that is fixed in frame 1, the sum of the terms is equation 7.123.
     """
-    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
-    v_0 = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
-    a_0 = eq.rotate(frame.R_0_1, vectors(a_1, "a_1"))
+    p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
+    v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
+    a_0 = eq.rotate(frame.R_0_1, as_vectors(a_1, "a_1"))
     transverse = eq.transverse(frame.alpha_0_1, p_0)
     centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
     return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))
@@ -172,14 +179,14 @@ def point_acceleration(
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
     """Return the vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`."""
     vector: FloatArray = eq.interorigin_vector(
-        scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
+        as_finite(d, "d"), as_unit_vectors(z, "z"), as_finite(a, "a"), as_unit_vectors(x, "x")
     )
     return vector
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
     """Return a joint's angular velocity: theta-dot z if rotary (7.62), and 0 if prismatic (7.63)."""
-    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    w: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
 
@@ -191,8 +198,8 @@ def interorigin_velocity(
     The derivative is w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
     angular velocity w_0i of link i is w_{i-1,i}, and the equations are 7.66 and 7.67.
     """
-    rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
-    sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
+    rotation: FloatArray = eq.tangential(as_vectors(w_0_i, "w_0_i"), as_vectors(d_vector, "d_vector"))
+    sliding: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
     return rotation if turns else rotation + sliding
 
 
@@ -202,14 +209,14 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is the vector
     d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
     """
-    z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
+    z, arm = np.broadcast_arrays(as_unit_vectors(z, "z"), as_vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
     return np.concatenate((linear, angular), axis=-1)
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
     """Return the rotation R(theta) (..., 2, 2) of the plane (7.5); its columns are x1 and y1 in frame 0."""
-    theta = scalars(theta, "theta")
+    theta = as_finite(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
     return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
 
@@ -222,12 +229,12 @@ def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
     """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3)."""
-    return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
+    return as_finite(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
     """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7)."""
-    speed = scalars(length, "length") * scalars(rate, "rate")
+    speed = as_finite(length, "length") * as_finite(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
@@ -237,7 +244,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, where `d_n_tool` (..., 3) is the vector
     from O_n to O_tool in frame 0.
     """
-    velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
+    velocity, d = as_vectors(velocity, "velocity", 6), as_vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
     moved = eq.point_velocity(linear, w, d)
     return np.concatenate(np.broadcast_arrays(moved, w), axis=-1)
@@ -248,7 +255,7 @@ def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
     This function is the inverse of `tool_velocity`.
     """
-    return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
+    return tool_velocity(velocity, -as_vectors(d_n_tool, "d_n_tool"))
 
 
 QUATERNION = "quaternion"
@@ -298,14 +305,14 @@ def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
     """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation."""
-    column = vectors(velocity, "velocity", 6)[..., np.newaxis]
+    column = as_vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
     """Return [d-dot; w] = C x-dot (7.119)."""
     C = representation_matrix(representation, R)
-    column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
+    column = as_vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
     return (C @ column)[..., 0]
 
 
@@ -318,6 +325,6 @@ def _blocks(lower: FloatArray) -> FloatArray:
 
 
 def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
-    array = scalars(value, name)
+    array = as_finite(value, name)
     columns = array.shape[-1] if array.ndim else 0
-    return matrices(array, name, rows, columns)
+    return as_matrices(array, name, rows, columns)

@@ -26,7 +26,7 @@ _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
 
-def floats(value: ArrayLike, name: str) -> FloatArray:
+def as_floats(value: ArrayLike, name: str) -> FloatArray:
     """Return real numbers as a float64 array; NaN and inf are allowed."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
@@ -51,32 +51,32 @@ def _is_masked(value: object) -> bool:
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
-def scalars(value: ArrayLike, name: str) -> FloatArray:
+def as_finite(value: ArrayLike, name: str) -> FloatArray:
     """Return finite real numbers as a float64 array of any shape."""
-    array = floats(value, name)
+    array = as_floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
     return array
 
 
-def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
+def as_vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
     """Return finite vectors (..., size) as a float64 array."""
-    array = scalars(value, name)
+    array = as_finite(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
     return array
 
 
-def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
+def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
     """Return finite matrices (..., rows, columns) as a float64 array."""
-    array = scalars(value, name)
+    array = as_finite(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
     return array
 
 
-def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    array = vectors(value, name)
+def as_unit_vectors(value: ArrayLike, name: str) -> FloatArray:
+    array = as_vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))
     if (np.abs(norms - 1.0) > UNIT_TOLERANCE).any():
         worst = norms.flat[np.abs(norms - 1.0).argmax()]
@@ -86,8 +86,8 @@ def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
     return array
 
 
-def rotations(value: ArrayLike, name: str) -> FloatArray:
-    array = matrices(value, name)
+def as_rotations(value: ArrayLike, name: str) -> FloatArray:
+    array = as_matrices(value, name)
     defect = rotation_defect(array).max(initial=0.0)
     if defect > ROTATION_TOLERANCE:
         found = f"R R^T differs from the identity by {defect:.3g}"

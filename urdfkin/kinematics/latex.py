@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 
 #: The textbook's LaTeX symbol for a parameter of a function in `equations`, by the parameter's name.
 #: A parameter without an entry is its own symbol.
@@ -52,49 +52,51 @@ class LatexTerm:
     text: str
     kind: int = _ATOM
 
-    def inside(self, kind: int) -> str:
+    def add_brackets(self, kind: int) -> str:
         return f"({self.text})" if self.kind >= kind else self.text
 
     def __neg__(self) -> LatexTerm:
-        return LatexTerm(f"-{self.inside(_SUM)}")
+        return LatexTerm(f"-{self.add_brackets(_SUM)}")
 
     def __add__(self, other: LatexTerm) -> LatexTerm:
         return LatexTerm(f"{self.text} + {other.text}", _SUM)
 
     def __sub__(self, other: LatexTerm) -> LatexTerm:
-        return LatexTerm(f"{self.text} - {other.inside(_SUM)}", _SUM)
+        return LatexTerm(f"{self.text} - {other.add_brackets(_SUM)}", _SUM)
 
     def __rsub__(self, other: int) -> LatexTerm:
         return LatexTerm(str(other)) - self
 
     def __mul__(self, other: LatexTerm) -> LatexTerm:
-        return LatexTerm(f"{self.inside(_SUM)} {other.inside(_SUM)}")
+        return LatexTerm(f"{self.add_brackets(_SUM)} {other.add_brackets(_SUM)}")
 
     def __rmul__(self, other: int) -> LatexTerm:
-        return LatexTerm(f"{other} {self.inside(_SUM)}")
+        return LatexTerm(f"{other} {self.add_brackets(_SUM)}")
 
 
 def _times(c: LatexTerm | int, x: LatexTerm) -> LatexTerm:
-    return LatexTerm(f"{c if isinstance(c, int) else c.inside(_CROSS)} \\, {x.inside(_SUM)}", x.kind)
+    return LatexTerm(
+        f"{c if isinstance(c, int) else c.add_brackets(_CROSS)} \\, {x.add_brackets(_SUM)}", x.kind
+    )
 
 
 def _cross(x: LatexTerm, y: LatexTerm) -> LatexTerm:
-    return LatexTerm(f"{x.inside(_CROSS)} \\times {y.inside(_CROSS)}", _CROSS)
+    return LatexTerm(f"{x.add_brackets(_CROSS)} \\times {y.add_brackets(_CROSS)}", _CROSS)
 
 
 def _rotate(R: LatexTerm, x: LatexTerm) -> LatexTerm:
-    return LatexTerm(f"{R.inside(_CROSS)} \\, {x.inside(_CROSS)}")
+    return LatexTerm(f"{R.add_brackets(_CROSS)} \\, {x.add_brackets(_CROSS)}")
 
 
-_latex_equations = bound(
+_latex_equations = bind_equations(
     plus=lambda x, y: x + y,
     minus=lambda x, y: x - y,
     times=_times,
     cross=_cross,
     rotate=_rotate,
     product=_rotate,
-    dot=lambda x, y: LatexTerm(f"{x.inside(_CROSS)} \\cdot {y.inside(_CROSS)}"),
-    transposed=lambda R: LatexTerm(f"{R.inside(_CROSS)}^T"),
+    dot=lambda x, y: LatexTerm(f"{x.add_brackets(_CROSS)} \\cdot {y.add_brackets(_CROSS)}"),
+    transposed=lambda R: LatexTerm(f"{R.add_brackets(_CROSS)}^T"),
 )
 
 

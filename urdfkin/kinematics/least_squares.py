@@ -18,7 +18,7 @@ _MOST_STEPS = 100
 #: First, smallest and largest damping, relative to the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 #: Factors of the damping after a step that reduces the error, and after a rejected step.
-_EASIER, _HARDER = 0.03, 10.0
+_DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before the step.
 _SLOW = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
@@ -33,13 +33,13 @@ def least_squares(
     derivatives: Callable[[State, Intermediate], FloatArray],
     move: Callable[[State, FloatArray], State],
     *,
-    longest: float = math.inf,
+    max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
     """Return the state with the smallest residuals near `start`, and the norm of these residuals.
 
     `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). A step
-    (parameters,) is rejected if the absolute value of a component is more than `longest`. The iteration ends
+    (parameters,) is rejected if the absolute value of a component is more than `max_step`. The iteration ends
     after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
@@ -55,15 +55,15 @@ def least_squares(
             break
         while damping <= _MOST_DAMPING:
             step = Vt.T @ (S / (S**2 + (damping * S[0]) ** 2) * along) / units
-            if np.abs(step).max() <= longest:
+            if np.abs(step).max() <= max_step:
                 trial = move(state, step)
                 trial_r, trial_intermediate = residuals(trial)
                 if (trial_error := float(np.linalg.norm(trial_r))) < error:
                     state, error, r, intermediate = trial, trial_error, trial_r, trial_intermediate
                     break
-            damping *= _HARDER
+            damping *= _DAMPING_INCREASE
         slow = slow + 1 if error > _SLOW * before else 0
         if error >= before * (1.0 - _NORM_ROUNDING * EPS * len(r)) or slow == patience > 0:
             break
-        damping = max(_EASIER * damping, _LEAST_DAMPING)
+        damping = max(_DAMPING_DECREASE * damping, _LEAST_DAMPING)
     return state, error

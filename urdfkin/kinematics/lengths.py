@@ -11,42 +11,44 @@ from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
 #: The five bounds (p, w, vel, alpha, acc).
-State = tuple[Length, ...]
+LinkBounds = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 
 
-def carried(state: State, d: Length) -> State:
+def translate_point(state: LinkBounds, d: Length) -> LinkBounds:
     """Return the bounds for the link's point at the distance d (7.58, 7.128, 7.130)."""
     p, w, vel, alpha, acc = state
     p, vel = eq.point_position(p, None, d), eq.point_velocity(vel, w, d)
     return p, w, vel, alpha, eq.point_acceleration(acc, alpha, w, d)
 
 
-def turned(state: State, d: Length, o: Length, o_rate: Length) -> State:
+def after_revolute(state: LinkBounds, d: Length, o: Length, o_rate: Length) -> LinkBounds:
     """Return the bounds of the link after a revolute joint (7.127, 7.129).
 
     The offset of the joint has the length d, and o is the absolute value of the joint velocity.
     """
-    p, w, vel, alpha, acc = carried(state, d)
+    p, w, vel, alpha, acc = translate_point(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
-def slid(state: State, d: Length, u: Length, u_rate: Length) -> State:
+def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> LinkBounds:
     """Return the bounds of the link after a prismatic joint (7.128, 7.130).
 
     The length d includes the joint's displacement.
     """
-    p, w, vel, alpha, acc = carried(state, d)
+    p, w, vel, alpha, acc = translate_point(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
 
-def freed(state: State, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length) -> State:
+def after_free_joint(
+    state: LinkBounds, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length
+) -> LinkBounds:
     """Return the bounds of the link after a planar or floating joint.
 
     The length d includes the joint's displacement.
     """
-    p, w, vel, alpha, acc = carried(state, d)
+    p, w, vel, alpha, acc = translate_point(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)
     return p, eq.plus(w, o), eq.plus(vel, u), alpha, acc

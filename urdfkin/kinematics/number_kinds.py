@@ -9,10 +9,10 @@ sum, a cross product becomes the product of two lengths, and a rotation changes 
 as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
 Rounding errors are not proportional to the result, because the result is small where large terms cancel.
 
-A scale is 0 or at least `SMALLEST`, the smallest normal number. This lower bound has two reasons. First, a
-product below `SMALLEST` has an absolute error of up to half the smallest subnormal number. Second, a product
-of two small numbers may underflow to zero, and a later operation may multiply the lost product by a large
-number.
+A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number. This lower bound has two reasons.
+First, a product below `SMALLEST_NORMAL` has an absolute error of up to half the smallest subnormal number.
+Second, a product of two small numbers may underflow to zero, and a later operation may multiply the lost
+product by a large number.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.kinematics.roundings import SMALLEST
+from urdfkin.kinematics.roundings import SMALLEST_NORMAL
 
-array_equations = bound(
+array_equations = bind_equations(
     plus=np.add,
     minus=np.subtract,
     times=lambda c, x: np.asarray(c)[..., np.newaxis] * x,
@@ -42,36 +42,40 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return x y for x, y >= 0; the result is at least `SMALLEST` if neither number is zero.
+    """Return x y for x, y >= 0; the result is at least `SMALLEST_NORMAL` if neither number is zero.
 
-    >>> product(1e-200, 1e-200) == SMALLEST, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
+    >>> product(1e-200, 1e-200) == SMALLEST_NORMAL, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))
     """
     if type(x) is float and type(y) is float:
-        return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
+        return SMALLEST_NORMAL if x * y < SMALLEST_NORMAL and x != 0.0 and y != 0.0 else x * y
     xy = np.asarray(np.multiply(x, y))
-    if xy.min(initial=np.inf) >= SMALLEST:
+    if xy.min(initial=np.inf) >= SMALLEST_NORMAL:
         return xy
-    return np.where((xy < SMALLEST) & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST, xy)
+    return np.where(
+        (xy < SMALLEST_NORMAL) & (np.not_equal(x, 0.0) & np.not_equal(y, 0.0)), SMALLEST_NORMAL, xy
+    )
 
 
-def counted(x: FloatArray) -> FloatArray:
-    """Return the absolute values |x|; every value that is not zero is raised to at least `SMALLEST`.
+def magnitude(x: FloatArray) -> FloatArray:
+    """Return the absolute values |x|; every value that is not zero is raised to at least `SMALLEST_NORMAL`.
 
-    >>> counted(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST, 2.0]
+    >>> magnitude(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
     True
     """
-    return np.where(x == 0.0, 0.0, np.maximum(np.abs(x), SMALLEST))
+    return np.where(x == 0.0, 0.0, np.maximum(np.abs(x), SMALLEST_NORMAL))
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n); a length is 0 or at least `SMALLEST`."""
-    return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow, but np.hypot does not.
+    """Return the lengths (...) of vectors (..., n); a length is 0 or at least `SMALLEST_NORMAL`."""
+    return magnitude(
+        np.hypot.reduce(x, axis=-1)
+    )  # Squares could underflow or overflow, but np.hypot does not.
 
 
 #: The textbook's equations for scales: the arguments are lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
-length_equations = bound(
+length_equations = bind_equations(
     plus=add,
     minus=add,
     times=product,

@@ -49,13 +49,20 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
 from urdfkin.errors.validators import as_str
-from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
+from urdfkin.kinematics.inputs import (
+    FloatArray,
+    as_finite,
+    as_matrices,
+    as_rotations,
+    as_unit_vectors,
+    as_vectors,
+)
 from urdfkin.kinematics.number_kinds import array_equations as eq
 
 
 def skew(w: ArrayLike) -> FloatArray:
     """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16)."""
-    w = vectors(w, "w")
+    w = as_vectors(w, "w")
     S = np.zeros((*w.shape, 3))
     S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
     S[..., 1, 2], S[..., 2, 0], S[..., 0, 1] = -w[..., 0], -w[..., 1], -w[..., 2]
@@ -68,7 +75,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     An entry of the symmetric part of S that exceeds `tolerance` times the largest entry of S raises
     InputError.
     """
-    S = matrices(S, "S")
+    S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
     symmetric = np.abs(S + S.swapaxes(-1, -2)).max(axis=(-1, -2), initial=0.0) / 2.0
     if (symmetric > tolerance * size).any():
@@ -81,8 +88,8 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     """Return S(R w) = R S(w) R^T, which expresses the skew-symmetric matrix S(w) in frame 0 (7.46)."""
-    R_0_1 = rotations(R_0_1, "R_0_1")
-    return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
+    R_0_1 = as_rotations(R_0_1, "R_0_1")
+    return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
 #: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
@@ -96,7 +103,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is 3e-9 at
     most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding error.
     """
-    M = rotations(M, name)
+    M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
     return M - M @ (0.5 * defect)
 
@@ -111,7 +118,7 @@ def polar_factor(M: FloatArray) -> FloatArray:
     return np.asarray(U @ Vt)
 
 
-def axis_aligning(axis: ArrayLike) -> FloatArray:
+def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
     """Return a rotation with `axis` as its third column; for the axis z, it is the identity.
 
     The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. If the
@@ -119,7 +126,7 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     the result is half a turn about x, followed by the shortest rotation from -z to `axis`. For a coordinate
     axis, the entries are exactly 0 and +-1.
     """
-    axis = unit_vectors(axis, "axis")
+    axis = as_unit_vectors(axis, "axis")
     x, y, z = np.moveaxis(axis, -1, 0)
     sign = np.copysign(1.0, z)
     scale = -1.0 / (sign + z)
@@ -131,7 +138,7 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
     """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42)."""
-    return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
+    return skew(as_vectors(w_0_1, "w_0_1")) @ as_rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
@@ -139,8 +146,8 @@ def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 
 
     `R_rate` (..., 3, 3) is the time derivative of `R_0_1` in 1/s; `unskew` defines `tolerance`.
     """
-    R_0_1 = rotations(R_0_1, "R_0_1")
-    return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
+    R_0_1 = as_rotations(R_0_1, "R_0_1")
+    return unskew(as_matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
@@ -148,7 +155,7 @@ def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
 
     `p_0` (..., 3) is the vector p, expressed in frame 0.
     """
-    return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
+    return np.cross(as_vectors(w_0_1, "w_0_1"), as_vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
@@ -157,7 +164,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     Entry i of `Rs` (..., n, 3, 3) is the orientation of frame i + 1 in frame i. Entry i of `ws` (..., n, 3)
     is the angular velocity of frame i + 1 relative to frame i, in frame i.
     """
-    Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
+    Rs, ws = as_rotations(Rs, "Rs"), as_vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
         raise InputError(
             "Rs (..., n, 3, 3) and ws (..., n, 3) must have the same n",
@@ -175,9 +182,9 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 NORM_TOLERANCE = 1e-6
 
 
-def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
+def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
     """Normalise quaternions (..., 4) whose norms differ from 1 by at most 1e-6."""
-    quat = vectors(value, name, 4)
+    quat = as_vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     if (np.abs(norms - 1.0) > NORM_TOLERANCE).any():
         worst = norms.flat[np.abs(norms - 1.0).argmax()]
@@ -186,9 +193,9 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
     return normalised
 
 
-def rotation_of(quat: ArrayLike) -> FloatArray:
+def rotation_from_quaternion(quat: ArrayLike) -> FloatArray:
     """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
-    rows = eq.rotation_of_quaternion(*np.moveaxis(unit_quaternions(quat), -1, 0))
+    rows = eq.rotation_of_quaternion(*np.moveaxis(normalise_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
@@ -197,7 +204,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 
     Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
     """
-    R = rotations(R, "R")
+    R = as_rotations(R, "R")
     # Each row of the matrix K = 4 q q^T is a multiple of the quaternion q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
@@ -213,17 +220,17 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
     return np.where(quat[..., 3:] < 0.0, -quat, quat)
 
 
-def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
+def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
     """Return the product of two quaternions of any length, with R(left right) = R(left) R(right)."""
-    left, right = vectors(left, "left", 4), vectors(right, "right", 4)
+    left, right = as_vectors(left, "left", 4), as_vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
     scalar = p0 * q0 - (p * q).sum(axis=-1, keepdims=True)
     return np.concatenate((p0 * q + q0 * p + np.cross(p, q), scalar), axis=-1)
 
 
-def conjugate(quat: ArrayLike) -> FloatArray:
+def conjugate_quaternion(quat: ArrayLike) -> FloatArray:
     """Return the conjugate (-q, q0); the conjugate of a unit quaternion is the inverse rotation."""
-    conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
+    conjugated: FloatArray = as_vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
 
@@ -238,7 +245,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
-    quat = unit_quaternions(quat)
+    quat = normalise_quaternions(quat)
     q, q0 = quat[..., :3], quat[..., 3]
     turn = -skew(q) if frame == "fixed" else skew(q)
     top = turn + q0[..., np.newaxis, np.newaxis] * np.eye(3)
@@ -247,7 +254,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return the time derivative (..., 4) of a body's quaternion from its angular velocity w (7.57)."""
-    return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
+    return (quaternion_rate_matrix(quat, frame) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def angular_velocity_from_quaternion_rates(
@@ -258,7 +265,7 @@ def angular_velocity_from_quaternion_rates(
     Rates along the quaternion change only the quaternion's length, and E^T maps them to 0.
     """
     E = quaternion_rate_matrix(quat, frame)
-    return 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
+    return 4.0 * (E.swapaxes(-1, -2) @ as_vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
 
 
 def integrate_orientation(
@@ -270,12 +277,12 @@ def integrate_orientation(
     the n increasing `times`. The angular velocity must be smooth within a step, so `times` must contain each
     jump. At both ends of a step, `w` is evaluated slightly inside the step.
     """
-    times = scalars(times, "times")
+    times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
         raise InputError(
             "times must be a one-dimensional array of increasing numbers", found=str(times.shape)
         )
-    quats = [unit_quaternions(quat)]
+    quats = [normalise_quaternions(quat)]
     for start, end in pairwise(times.tolist()):
         quats.append(_step(w, quats[-1], start, end, frame))
     return np.stack(quats)
@@ -286,7 +293,8 @@ def _step(
 ) -> FloatArray:
     step = end - start
     first, middle, last = (
-        vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
+        as_vectors(w(t), "w")
+        for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
     )
     k1 = _rates(quat, first, frame)
     k2 = _rates(quat + step / 2.0 * k1, middle, frame)
@@ -306,8 +314,8 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28)."""
-    axis = unit_vectors(axis, "axis")
-    angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
+    axis = as_unit_vectors(axis, "axis")
+    angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
     # For small angles phi, this formula of the versine 1 - cos(phi) has no cancellation.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
@@ -321,24 +329,24 @@ def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
     """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
-    return scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
+    return as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
     """Return phi-dot k x p, the velocity of the tip of a vector p that turns about the axis k (7.21)."""
-    return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
+    return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the components of p parallel and perpendicular to the axis k (7.18)."""
-    axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
+    axis, p = as_unit_vectors(axis, "axis"), as_vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
     """Return the rotation of the rotation vector phi k; the angle phi may be 0."""
-    vector = vectors(rotation_vector, "rotation_vector")
+    vector = as_vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
     # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
@@ -371,15 +379,15 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 _AXES = "xyz"
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
 #: Twelve Euler sequences with axes that turn with the body, and twelve with fixed axes.
-SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
+EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class EulerSequence:
     """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
 
     The axes `first`, `second` and `third` turn with the body. The axis `other` is neither the first nor the
-    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `fixed` is true, the
+    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `is_fixed` is true, the
     name lists axes that are fixed in space, in the reverse order of the body's axes.
     """
 
@@ -389,32 +397,32 @@ class Sequence:
     third: int
     other: int
     sign: float
-    fixed: bool
+    is_fixed: bool
 
     @property
-    def proper(self) -> bool:
+    def is_proper(self) -> bool:
         """Whether the first and the third axis are the same, as in ZYZ."""
         return self.first == self.third
 
-    def turning(self, values: FloatArray) -> FloatArray:
+    def reorder(self, values: FloatArray) -> FloatArray:
         """Convert values from the order of the letters in `name` to the order of the body's axes, or back."""
-        return values[..., ::-1] if self.fixed else values
+        return values[..., ::-1] if self.is_fixed else values
 
 
-def sequence(name: str) -> Sequence:
-    if as_str(name, "an Euler sequence") not in SEQUENCES:
-        raise UnknownNameError("Euler sequence", name, SEQUENCES)
-    return _sequence(name)
+def find_sequence(name: str) -> EulerSequence:
+    if as_str(name, "an Euler sequence") not in EULER_SEQUENCES:
+        raise UnknownNameError("Euler sequence", name, EULER_SEQUENCES)
+    return _make_sequence(name)
 
 
 @cache
-def _sequence(name: str) -> Sequence:
-    fixed = name.islower()
-    letters = name.lower()[::-1] if fixed else name.lower()
+def _make_sequence(name: str) -> EulerSequence:
+    is_fixed = name.islower()
+    letters = name.lower()[::-1] if is_fixed else name.lower()
     first, second, third = (_AXES.index(letter) for letter in letters)
     other = 3 - first - second
     sign = 1.0 if (second - first) % 3 == 1 else -1.0
-    return Sequence(name, first, second, third, other, sign, fixed)
+    return EulerSequence(name, first, second, third, other, sign, is_fixed)
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
@@ -431,8 +439,8 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
     """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ"."""
-    axes = sequence(name)
-    turns = axes.turning(vectors(angles, "angles"))
+    axes = find_sequence(name)
+    turns = axes.reorder(as_vectors(angles, "angles"))
     product: FloatArray = (
         coordinate_rotation(axes.first, turns[..., 0])
         @ coordinate_rotation(axes.second, turns[..., 1])
@@ -449,10 +457,10 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     determined. The third angle is computed from the first angle, so that the product of the three rotations
     is correct.
     """
-    axes = sequence(name)
-    R = rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
+    axes = find_sequence(name)
+    R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
     i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
-    if axes.proper:
+    if axes.is_proper:
         first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
         second = np.arctan2(np.hypot(R[..., j, i], R[..., m, i]), R[..., i, i])
     else:
@@ -463,9 +471,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
     # Only two entries of row `j` are not 0: the entries of the second axis and of the axis `rest`.
-    rest, sense = (m, sign) if axes.proper else (i, -sign)
+    rest, sense = (m, sign) if axes.is_proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
-    return axes.turning(np.stack((first, second, third), axis=-1)).copy()
+    return axes.reorder(np.stack((first, second, third), axis=-1)).copy()
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
@@ -487,24 +495,24 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
     The columns of Omega are the axes of the three rotations, in frame 0.
     """
-    axes = sequence(name)
-    turns = axes.turning(vectors(angles, "angles"))
+    axes = find_sequence(name)
+    turns = axes.reorder(as_vectors(angles, "angles"))
     R_0_1 = coordinate_rotation(axes.first, turns[..., 0])
     R_0_2 = R_0_1 @ coordinate_rotation(axes.second, turns[..., 1])
     first = np.broadcast_to(np.eye(3)[axes.first], R_0_1.shape[:-1])
     columns = np.stack((first, R_0_1[..., axes.second], R_0_2[..., axes.third]), axis=-1)
-    return axes.turning(columns).copy()
+    return axes.reorder(columns).copy()
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
     """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
-    product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
+    product = euler_rate_matrix(name, angles) @ as_vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56)."""
-    return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
+    return (euler_rate_inverse(name, angles, nearest) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
@@ -514,13 +522,13 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axis has no component along the second axis. One component of w then gives the third rate, and the other
     two components give the first and the second rate.
     """
-    angles = vectors(angles, "angles")
+    angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
-    axes = sequence(name)
-    turns = axes.turning(angles)
+    axes = find_sequence(name)
+    turns = axes.reorder(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
     # `along` and `across` are the third axis' components along the axes `first` and `other`.
-    if axes.proper:
+    if axes.is_proper:
         along, across = cosine, -axes.sign * sine
     else:
         along, across = axes.sign * sine, cosine
@@ -530,7 +538,7 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     inverse[..., 0, axes.first] = 1.0
     inverse[..., 0, axes.other] = -along / across
     inverse = inverse @ coordinate_rotation(axes.first, turns[..., 0]).swapaxes(-1, -2)
-    return inverse[..., ::-1, :].copy() if axes.fixed else inverse
+    return inverse[..., ::-1, :].copy() if axes.is_fixed else inverse
 
 
 def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
@@ -539,9 +547,9 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
     A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
     names only 0). The other sequences are singular if the middle angle is an odd multiple of pi/2.
     """
-    middle = vectors(angles, "angles")[..., 1]
+    middle = as_vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
-    return np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
+    return np.arctan2(sine, cosine) if find_sequence(name).is_proper else np.arctan2(cosine, sine)
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
@@ -551,7 +559,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
     is cot(d / 2). At the singularity, the function raises RepresentationSingularityError.
     """
-    angles = vectors(angles, "angles")
+    angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)
     return 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
 

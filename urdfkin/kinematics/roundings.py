@@ -28,8 +28,8 @@ The acceleration of a frame, for example, is a sum of terms such as w x (w x d);
 factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
 errors too. In each implementation, the sum of these errors is at most 2 eps for each term, which has two or
 three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count includes one more
-joint than the path has. This joint covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
-instead of 22.5. The difference of 1.5 covers the other sums.
+joint than the path has. This joint covers the frame's own offset and the first sum. Second,
+`PINOCCHIO_ROUNDINGS` is 24 instead of 22.5. The difference of 1.5 covers the other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -42,9 +42,9 @@ If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix
 A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant rotation by A, and
 by the inverse of the previous joint's A. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
 result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
-41. `ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over its
-range, the standard deviation of the sum is 3.3. For a single joint, `ROUNDINGS` is seven times this standard
-deviation.
+41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over
+its range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times
+this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
@@ -81,9 +81,9 @@ Each omitted component of an offset causes an error of 0.5; two components cause
 offset's length. In a matrix row and in a cross product, an export also omits each product that contains an
 omitted component. These products would have a rounding error of 1.5, so the omission causes a smaller error.
 Without fused multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint,
-plus the errors of the sums over the joints. `ROUNDINGS` is 24.0 and does not cover these sums. The standard
-deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the error is
-at most 7.2 eps, which is within `ROUNDINGS`.
+plus the errors of the sums over the joints. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these sums. The
+standard deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the
+error is at most 7.2 eps, which is within `PINOCCHIO_ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
 2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.function`
@@ -113,8 +113,8 @@ converts it to a matrix. If all rounding errors have the same sign, the error is
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2. The difference of 2.8 covers the
-sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO_ROUNDINGS` is 30 instead of 27.2. The difference of 2.8
+covers the sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
 doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
@@ -139,8 +139,8 @@ rotation. The counts, with u = eps/2, are
 | a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
 | sum | 3.2 | 17.0 |
 
-The sum 20.2 is within `ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin) and 5.1
-(Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
+The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin)
+and 5.1 (Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
 
 **An MJCF equality** is y - y0 = c0 + c1 (x - x0), with reference values y0 and x0. The tree's mimic rules
 satisfy it up to
@@ -187,22 +187,22 @@ from urdfkin.kinematics.inputs import FloatArray
 
 EPS = sys.float_info.epsilon
 #: Relative error of rounding a number to single precision.
-SINGLE = 2.0**-24
+SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
-SMALLEST = sys.float_info.min
+SMALLEST_NORMAL = sys.float_info.min
 #: Smallest positive value of the unit `eps * scale`; it is the smallest subnormal number.
-LEAST_UNIT = EPS * SMALLEST
-#: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
-NOT_ZERO = 1e-300
+LEAST_UNIT = EPS * SMALLEST_NORMAL
+#: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
+MIN_DIVISOR = 1e-300
 
 #: Allowed difference (in eps) from Pinocchio, for each joint and each factor of a term such as w x (w x d).
-ROUNDINGS = 24.0
+PINOCCHIO_ROUNDINGS = 24.0
 #: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term such as w x (w x d).
-MUJOCO = 30.0
+MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
-MJCF_RULE = 8.0
+MJCF_RULE_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
-ROW = 8.0
+ROW_ROUNDINGS = 8.0
 
 # Errors in exports in single precision (`urdfkin.export.function`); the docstring derives the errors.
 
@@ -220,79 +220,79 @@ SINGLE_POLYNOMIAL = 1.0
 #: The worst case is 18.9 eps: the sum of the docstring's first table without the row "rotation about the
 #: axis".
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
-CONSTANT = 13.7
+CONSTANT_POSE_ROUNDINGS = 13.7
 #: Error (in eps) of the directions of two joint axes.
 #: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
-AXES = 5.0
+AXIS_ROUNDINGS = 5.0
 #: Error (in eps) of each joint in a file, because a program rounded the numbers when it wrote the file.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
 #: Roll and pitch both change the angle between a joint's z axis and the z axis of the joint before it.
 #: Yaw does not change this angle. Therefore, the error of 22.5 eps counts twice.
-WRITTEN = 45.0
+FILE_ROUNDINGS = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path.
 #: A dot product has an error of 2.4 eps; each sum of lengths has an error of 0.5 eps times the sum.
 #: Only a few of these sums are nearly as large as the path's length.
-SUMMED = 4.0
+LENGTH_ROUNDINGS = 4.0
 
 # Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
 #: Error (in eps) of an angle up to pi.
 #: A computed multiple of pi/12 has an error of 1.2, a value of arctan2 has an error of 1.1, and a number in
 #: a file has an error of 1.0.
-ANGLE = 4.0
+ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
 #: One factor of each product is also a difference of two products, which adds an error of 0.75.
-ENTRY = 2.0
+ENTRY_ROUNDINGS = 2.0
 #: Allowed change when a length is rounded to twelve digits, in units of eps times the length of the path.
-DIGITS = SUMMED / 2.0
+DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
 #: The product's error is the sum of 0.5 (sines), 0.5 (cosines), 1.4 and 1.8 (the two multiplications).
-TURN = 8.0
+ROTATION_ROUNDINGS = 8.0
 
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
-#: The sum of the four errors is 2.0. `MIMIC_LIMIT` is twice this sum, so that both ends of the converted
-#: range are accepted.
-MIMIC_LIMIT = 4.0
+#: The sum of the four errors is 2.0. `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the
+#: converted range are accepted.
+MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
-def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
+def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference (in eps) between urdfkin and Pinocchio, for each factor of a term.
 
     For example, the term w x (w x d) has three factors. `joints` is the number of joints on the path. `tilt`
     is the sum over these joints of the angle (radians) between Pinocchio's axis and the file's axis.
 
-    >>> of_joints([7, 8]).tolist()
+    >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
     """
-    return np.asarray(ROUNDINGS * np.asarray(joints) + 2.0 * np.asarray(tilt) / EPS)
+    return np.asarray(PINOCCHIO_ROUNDINGS * np.asarray(joints) + 2.0 * np.asarray(tilt) / EPS)
 
 
-def of_rows(rows: int) -> float:
+def table_roundings(rows: int) -> float:
     """Return the rounding error (in eps) of a pose that is computed from a table with `rows` rows and a tool.
 
     The rounding of the joint values, half an eps, is not included.
     """
-    return ROW * (rows + 1)
+    return ROW_ROUNDINGS * (rows + 1)
 
 
-def of_rows_read_back(rows: int) -> float:
+def read_back_roundings(rows: int) -> float:
     """Return the allowed difference (in eps) between a table and the URDF that was written from the table.
 
-    The pose from the table and Pinocchio's pose from the URDF have the error `of_rows(rows)` each. The
-    conversion to roll, pitch and yaw has twice this error.
+    The pose from the table and Pinocchio's pose from the URDF have the error `table_roundings(rows)` each.
+    The conversion to roll, pitch and yaw has twice this error.
     """
-    return 4.0 * of_rows(rows)
+    return 4.0 * table_roundings(rows)
 
 
-def of_a_fit(rows: int) -> float:
+def fit_roundings(rows: int) -> float:
     """Return the allowed difference (in eps) between a URDF and a table that was fitted to the URDF.
 
-    The fit is iterative. After the last iteration, the error can be up to 12.5 times `of_rows(rows)`.
+    The fit is iterative. After the last iteration, the error can be up to 12.5 times `table_roundings(rows)`.
     """
-    return 12.5 * of_rows(rows)
+    return 12.5 * table_roundings(rows)

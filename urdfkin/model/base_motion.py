@@ -9,7 +9,7 @@ import numpy as np
 
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.kinematics.rotation import nearest_rotation
-from urdfkin.model.tree import FloatArray, frozen
+from urdfkin.model.tree import FloatArray, freeze
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class BaseMotion:
 
     def __post_init__(self) -> None:
         for name, shape in (("placement", (4, 4)), ("velocity", (6,)), ("acceleration", (6,))):
-            array = frozen(getattr(self, name))
+            array = freeze(getattr(self, name))
             if array.shape[-len(shape) :] != shape or not np.isfinite(array).all():
                 raise InputError(
                     f"the base's {name} must be a finite array (..., {', '.join(map(str, shape))})",
@@ -59,7 +59,7 @@ class BaseMotion:
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement must be 0 0 0 1")
         R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")
-        object.__setattr__(self, "_rotation", frozen(R))
+        object.__setattr__(self, "_rotation", freeze(R))
 
     def __reduce__(self) -> tuple[type[BaseMotion], tuple[Any, ...]]:
         return type(self), (self.placement, self.velocity, self.acceleration)
@@ -96,11 +96,11 @@ class BaseMotion:
 
 
 #: A fixed base at the world's origin.
-STILL = BaseMotion()
-STILL_STATE = frozen(STILL.state(()))
+FIXED_BASE = BaseMotion()
+FIXED_BASE_STATE = freeze(FIXED_BASE.state(()))
 
 
-def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
+def subtract_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
 
     The readings of an accelerometer do not change if gravity is replaced by an acceleration of the base.

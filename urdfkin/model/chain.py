@@ -17,9 +17,9 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.rotation import axis_aligning
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.kinematics.rotation import rotation_with_z_axis
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
@@ -28,13 +28,13 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    frozen,
+    freeze,
     inverse,
     pose,
 )
 
 #: Smallest size (m) that a comparison assumes for a robot, even if all its frames coincide.
-LEAST_SIZE = 1e-9
+MIN_ROBOT_SIZE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,8 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
             an upper bound on the length of the translation in A_k, for any rotations of the fixed joints.
-        folded: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
+        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed
+            joints.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -92,7 +93,7 @@ class FrameChain(Displayable):
     joints: tuple[ChainJoint, ...]
     T_last_tip: FloatArray
     lengths: FloatArray
-    folded: tuple[int, ...]
+    pose_counts: tuple[int, ...]
 
     def __repr__(self) -> str:
         return log_line(f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>")
@@ -130,7 +131,7 @@ class FrameChain(Displayable):
         >>> path.coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
+        return make_coupling([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -177,7 +178,7 @@ class FrameChain(Displayable):
         """
         return float(self.lengths[1:].sum())
 
-    def frames(self, q: Given | None = None) -> FloatArray:
+    def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the poses (..., n + 1, 4, 4) of all joint frames and of the tip in the base frame.
 
         Each joint frame is the frame before the joint's motion.
@@ -196,7 +197,7 @@ class FrameChain(Displayable):
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         return self.path.frames(values)[..., ::2, :, :]
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length.
 
         >>> import urdfkin
@@ -206,7 +207,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
-    def axes(self, q: Given | None = None) -> FloatArray:
+    def axes(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration.
 
         >>> import urdfkin
@@ -216,7 +217,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
-    def origins(self, q: Given | None = None) -> FloatArray:
+    def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin.
 
         >>> import urdfkin
@@ -226,7 +227,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
-    def interorigin(self, q: Given | None = None) -> FloatArray:
+    def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip.
 
         >>> import urdfkin
@@ -237,30 +238,30 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 
-def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
+def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     """Return the path from `base` to `tip`; a planar or floating joint on the path raises InputError."""
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
-    lengths, folded, count = list[float](), list[int](), 0
-    for joint, backwards in steps_between(tree, tip, base_name):
+    lengths, pose_counts, count = list[float](), list[int](), 0
+    for joint, backwards in joints_between(tree, tip, base_name):
         _check_single_axis(tree, joint, base_name, tip)
         to_joint, from_joint = _poses_around(joint, backwards)
         A = A @ to_joint
         length += 0.0 if backwards else joint.length
         count += 1
         if joint.kind.has_axis:
-            joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
+            joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
-            folded.append(count)
+            pose_counts.append(count)
             # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
-    ends = frozen(A), frozen([*lengths, length]), (*folded, count)
+    ends = freeze(A), freeze([*lengths, length]), (*pose_counts, count)
     return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
 
-def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
+def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
     """Return all joints from `base` to `tip`; True marks a joint that is passed from child to parent."""
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
@@ -277,7 +278,7 @@ def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray
     """
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
-    align = pose(axis_aligning(-joint.axis if backwards else joint.axis))
+    align = pose(rotation_with_z_axis(-joint.axis if backwards else joint.axis))
     if backwards:
         return align, align.T @ inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T

@@ -22,126 +22,141 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
-from urdfkin.kinematics.inputs import floats
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
-from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT
+from urdfkin.kinematics.inputs import as_floats
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, normalise_quaternions, rotation_from_quaternion
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
+from urdfkin.model.configuration_like import (
+    ConfigurationLike,
+    CoordinateLayout,
+    Hint,
+    as_text_or_mapping,
+    join_names,
+)
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
     KinematicTree,
     Limit,
     Mimic,
-    far_outside,
-    frozen,
+    far_limits,
+    freeze,
     is_bounded,
 )
 
-#: Sampled ranges are cut off at +-`WIDEST` (rad or m). A missing limit is replaced by +-`WIDEST`.
+#: Samples are at most this far from zero (rad or m). This number also replaces a missing limit.
 #: The range of a continuous joint is -pi to pi.
-WIDEST = 10.0
+#: All bounds assume this largest distance (m) from zero for a joint without limits that translates.
+#: Few linear axes of robots are longer. A bound for a travel of 10 m also holds for a shorter travel.
+ASSUMED_LIMIT = 10.0
+#: The condition of a bound, as text, if a joint that translates has no limits.
+TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
 @dataclass(frozen=True, slots=True)
-class NarrowedRange:
+class RangeReduction:
     """A mimicked joint's own range, and the part of this range that its mimic joints allow.
 
     Attributes:
-        allowed: The part of `own` in which all mimic joints are within their limits; None if at most one
-            value is allowed.
-        by: Names of the mimic joints whose limits make the range smaller.
+        allowed_range: The part of `joint_range` in which all mimic joints are within their limits; None if at
+            most one value is allowed.
+        mimic_joints: Names of the mimic joints whose limits make the range smaller.
     """
 
     joint: str
-    own: tuple[float, float]
-    allowed: tuple[float, float] | None
-    by: tuple[str, ...]
+    joint_range: tuple[float, float]
+    allowed_range: tuple[float, float] | None
+    mimic_joints: tuple[str, ...]
     unit: str
 
     def __str__(self) -> str:
-        names = ", ".join(self.by)
-        own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
-        if self.allowed is None:
+        names = ", ".join(self.mimic_joints)
+        own = f"joint {self.joint} ranges over {format_range(self.joint_range)} {self.unit}"
+        if self.allowed_range is None:
             return f"{own}; at most one value keeps all its mimic joints within their limits ({names})"
-        allowed = range_words(self.allowed)
+        allowed = format_range(self.allowed_range)
         return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
 
 
-def range_words(ends: tuple[float, float]) -> str:
+def format_range(ends: tuple[float, float]) -> str:
     """Return the two ends of a range as text.
 
-    >>> range_words((-0.005, 0.055))
+    >>> format_range((-0.005, 0.055))
     '-0.005 to 0.055'
     """
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
 
 
-def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`slide` to `slide` (m)."""
+def axis_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
+    """Return the ends of a joint's range; without limits, +-pi (rad) or +-`ASSUMED_LIMIT` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
-    return (-math.pi, math.pi) if kind.turns else (-slide, slide)
+    return (-math.pi, math.pi) if kind.turns else (-ASSUMED_LIMIT, ASSUMED_LIMIT)
 
 
-def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
+def largest_value(limit: Limit | None) -> float:
+    """Return the largest absolute value (rad or m) within limits; `ASSUMED_LIMIT` without limits."""
+    return max(abs(limit.lower), abs(limit.upper)) if is_bounded(limit) else ASSUMED_LIMIT
+
+
+def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
     """Return uniform random values (count, ranges) in the given ranges (lower, upper)."""
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
-def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
+def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the range of each joint with one coordinate, without the limits of its mimic joints."""
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
             return -math.pi, math.pi
         if joint.limit is None:
-            return -WIDEST, WIDEST
-        lower, upper = np.clip((joint.limit.lower, joint.limit.upper), -WIDEST, WIDEST).tolist()
+            return -ASSUMED_LIMIT, ASSUMED_LIMIT
+        lower, upper = np.clip((joint.limit.lower, joint.limit.upper), -ASSUMED_LIMIT, ASSUMED_LIMIT).tolist()
         return min(lower, upper), max(lower, upper)
 
     return {joint.name: own_range(joint) for joint in tree.joints if joint.nq == 1}
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Narrow `own_ranges` so that all mimic joints are within their limits, where this is possible."""
-    ranges = own_ranges(tree)
-    narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}
+    """Narrow `joint_ranges` so that all mimic joints are within their limits, where this is possible."""
+    ranges = joint_ranges(tree)
+    narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
 
 
-def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
-    ranges = own_ranges(tree)
-    allowed, by = dict[str, tuple[float, float]](), dict[str, list[str]]()
+def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
+    ranges = joint_ranges(tree)
+    allowed, limiting_joints = dict[str, tuple[float, float]](), dict[str, list[str]]()
     for joint in tree.joints:
         if (rule := joint.mimic) is None or (limit := joint.limit) is None:
             continue
         own = ranges[rule.leader]
-        if allowed_range(rule, limit, *own) != own:
-            by.setdefault(rule.leader, []).append(joint.name)
-        allowed[rule.leader] = allowed_range(rule, limit, *allowed.get(rule.leader, own))
+        if restrict_range(rule, limit, *own) != own:
+            limiting_joints.setdefault(rule.leader, []).append(joint.name)
+        allowed[rule.leader] = restrict_range(rule, limit, *allowed.get(rule.leader, own))
     return tuple(
-        NarrowedRange(
+        RangeReduction(
             leader,
             ranges[leader],
             ends if ends[0] < ends[1] else None,
-            tuple(by[leader]),
+            tuple(limiting_joints[leader]),
             "rad" if tree.joints[tree.joint_index(leader)].kind.turns else "m",
         )
         for leader, ends in allowed.items()
-        if leader in by
+        if leader in limiting_joints
     )
 
 
-def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
+def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
 
     If the mimic joint is outside its limits in the whole range, the lower end is above the upper end.
     """
-    least, most = _rounded_outwards(limit)
+    least, most = _widen_limits(limit)
 
     def is_allowed(leader: float) -> bool:
         return least <= rule.multiplier * leader + rule.offset <= most
@@ -153,16 +168,18 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
     # The rounding error of the mimic joint's value narrows the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
-    error = MIMIC_LIMIT * EPS * size / abs(rule.multiplier)
+    error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
     if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
-        error = MIMIC_LIMIT * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        error = (
+            MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        )
     return (
         lower if is_allowed(lower) else max(lower, ends[0] + error),
         upper if is_allowed(upper) else min(upper, ends[1] - error),
     )
 
 
-def _rounded_outwards(limit: Limit) -> tuple[float, float]:
+def _widen_limits(limit: Limit) -> tuple[float, float]:
     """Widen the limits by one unit in the last place, because parsing rounds a decimal limit."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
@@ -172,12 +189,12 @@ _MIMIC_TOLERANCE = 1e-9
 
 
 #: Suffix and unit of each coordinate of a planar or floating joint.
-#: `_OF_RATES` contains the suffixes and units of the joint velocities of these joints.
-_OF_Q = {
+#: `_VELOCITY_SUFFIXES` contains the suffixes and units of the joint velocities of these joints.
+_Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-_OF_RATES = {
+_VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
 }
@@ -185,15 +202,15 @@ _OF_RATES = {
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
     """Return the names of the numbers of `q`, with suffixes such as `.x` for a floating joint."""
-    return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
+    return tuple(name for name, _ in _names_and_units(tree, _Q_SUFFIXES))
 
 
-def rate_names(tree: KinematicTree) -> tuple[str, ...]:
-    return tuple(name for name, _ in _names_and_units(tree, _OF_RATES))
+def velocity_names(tree: KinematicTree) -> tuple[str, ...]:
+    return tuple(name for name, _ in _names_and_units(tree, _VELOCITY_SUFFIXES))
 
 
 def _names_and_units(
-    tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
+    tree: KinematicTree, suffixes_by_kind: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
     taken = set[str]()
     for joint in tree.joints:
@@ -203,37 +220,39 @@ def _names_and_units(
             yield joint.name, "rad" if joint.kind.turns else "m"
             continue
         taken = taken or {other.name for other in tree.joints}
-        suffixes, separator = of[joint.kind], "."
+        suffixes, separator = suffixes_by_kind[joint.kind], "."
         while not taken.isdisjoint(names := [f"{joint.name}{separator}{suffix}" for suffix in suffixes]):
             separator = ":" if separator == "." else separator + ":"
         taken.update(names)
         yield from zip(names, suffixes.values(), strict=True)
 
 
-def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
+def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
     """Return the unit of each number of q, v or a: "rad", "m" or ""; the time unit is omitted."""
-    return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
+    return tuple(
+        unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
+    )
 
 
-def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
-    is_q = what == "q"
+def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
+    is_q = symbol == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
         for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
         if joint.nv > 1
     }
     return CoordinateLayout(
-        what,
-        _names(tree, what),
-        units(tree, what),
+        symbol,
+        _names(tree, symbol),
+        units(tree, symbol),
         spans,
         poses=lambda: poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
-        otherwise=lambda: _without_coordinate(tree),
-        lengths=lambda: _other_lengths(tree, what),
+        hints_by_name=lambda: _hints_by_name(tree),
+        hints_by_length=lambda: _hints_by_length(tree, symbol),
     )
 
 
-def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
+def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
     return {
         joint.name: Hint(
             f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
@@ -248,7 +267,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
     }
 
 
-def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
+def _hints_by_length(tree: KinematicTree, symbol: str) -> dict[int, Hint]:
     """Return hints for wrong lengths of q, v or a that users often pass.
 
     These are the lengths of Pinocchio's vectors, and the length of a vector that includes the mimic joints.
@@ -260,7 +279,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
     )
     mimic_count = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
     hints: dict[int, Hint] = {}
-    if what == "q":
+    if symbol == "q":
         for mimic in (False, True):
             option = f", mimic={mimic}" if has_mimic_joints else ""
             hints[_pinocchio_length(tree, mimic=mimic)] = Hint(
@@ -272,9 +291,9 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
             remedy = f"{convert.remedy}; or {leave_out.remedy}" if convert else leave_out.remedy
             hints[tree.nq + mimic_count] = leave_out._replace(remedy=remedy)
     elif has_mimic_joints:
-        remedy = f"Pinocchio's {what} has that length: {leave_out.remedy}"
+        remedy = f"Pinocchio's {symbol} has that length: {leave_out.remedy}"
         hints[tree.nv + mimic_count] = leave_out._replace(remedy=remedy)
-    hints.pop(len(_names(tree, what)), None)
+    hints.pop(len(_names(tree, symbol)), None)
     return hints
 
 
@@ -297,16 +316,16 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     for name, (lower, upper) in coordinate_ranges(tree).items():
         if not lower <= 0.0 <= upper:
             ready[tree.q_index[tree.joint_index(name)]] = (lower + upper) / 2.0
-    found = {"neutral": neutral(tree), "ready": ready}
+    configurations = {"neutral": neutral(tree), "ready": ready}
     for pose, values in tree.poses.items():
         q = ready.copy() if pose == "ready" else neutral(tree)
         for name, value in values.items():
             q[tree.q_index[tree.joint_index(name)]] = value
-        found[pose] = q
-    return found
+        configurations[pose] = q
+    return configurations
 
 
-def locked_values(
+def parse_locks(
     tree: KinematicTree, lock: str | Mapping[str, ArrayLike], joints: Sequence[str] | None = None
 ) -> dict[str, float]:
     """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
@@ -317,13 +336,15 @@ def locked_values(
     UnknownNameError. Any other invalid lock, for example a value outside the limits, raises InputError.
     """
     layout = coordinate_layout(tree, "q")
-    values, pose = layout.named(lock, "lock")
-    chosen = set(values)
+    values, pose = layout.parse_by_name(lock, "lock")
+    locked_names = set(values)
     if joints is not None:
-        layout.demand_names(joints, "joints")
-        if twice := sorted(chosen.intersection(joints)):
-            raise InputError("a joint to lock is also in the list joints", where="lock", found=listed(twice))
-        chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
+        layout.check_names(joints, "joints")
+        if repeated := sorted(locked_names.intersection(joints)):
+            raise InputError(
+                "a joint to lock is also in the list joints", where="lock", found=join_names(repeated)
+            )
+        locked_names |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or use joints (--joints) to list the joints that remain movable"
         raise InputError(
@@ -333,24 +354,24 @@ def locked_values(
             question=QuestionsSection.LOCKED_JOINTS,
         )
     for name, (at, size) in layout.spans.items():
-        if not chosen.isdisjoint([name, *layout.names[at : at + size]]):
+        if not locked_names.isdisjoint([name, *layout.names[at : at + size]]):
             kind = tree.joints[tree.joint_index(name)].kind.value
             remedy = "leave it out" if joints is None else "add it to joints (--joints)"
             claim, question = f"a {kind} joint has no single value to lock", QuestionsSection.LOCKED_JOINTS
             raise InputError(claim, where=name, remedy=remedy, question=question)
-    rest = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
-    q = layout.read({**dict(rest), **values}, "lock")
+    defaults = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
+    q = layout.parse({**dict(defaults), **values}, "lock")
     if q.ndim > 1:
         raise InputError("a locked joint needs one value", where="lock", found=f"shape {q.shape[:-1]}")
-    locked = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}
+    locked = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in locked_names}
     for name, x in locked.items():
         if not math.isfinite(x):
             raise NotFiniteError("a locked joint needs a finite value", where=f"lock, {name}", found=str(x))
-    _demand_within_limits(tree, locked)
+    _check_limits(tree, locked)
     return locked
 
 
-def _demand_within_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
+def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
     """Raise InputError if a locked joint, or a joint that mimics it, is outside its limits.
 
     A mimic joint that is outside its limits at every value of the locked joint is not checked.
@@ -358,7 +379,9 @@ def _demand_within_limits(tree: KinematicTree, locked: Mapping[str, float]) -> N
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
         q[tree.q_index[tree.joint_index(name)]] = value
-    impossible = {name for one in narrowed_ranges(tree) if one.allowed is None for name in one.by}
+    impossible = {
+        name for one in range_reductions(tree) if one.allowed_range is None for name in one.mimic_joints
+    }
     for joint, words in _violations(tree, q):
         if joint.name not in impossible:
             name = joint.mimic.leader if joint.mimic else joint.name
@@ -371,19 +394,19 @@ def _demand_within_limits(tree: KinematicTree, locked: Mapping[str, float]) -> N
 
 
 def limits(tree: KinematicTree) -> FloatArray:
-    found = np.tile([[-np.inf], [np.inf]], tree.nq)
+    bounds = np.tile([[-np.inf], [np.inf]], tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
-            found[:, at] = joint.limit.lower, joint.limit.upper
-    return frozen(found)
+            bounds[:, at] = joint.limit.lower, joint.limit.upper
+    return freeze(bounds)
 
 
 def velocity_limits(tree: KinematicTree) -> FloatArray:
-    found = np.full(tree.nv, np.inf)
+    bounds = np.full(tree.nv, np.inf)
     for joint, at in zip(tree.joints, tree.v_index, strict=True):
         if joint.nv == 1 and joint.limit is not None:
-            found[at] = joint.limit.velocity
-    return frozen(found)
+            bounds[at] = joint.limit.velocity
+    return freeze(bounds)
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
@@ -393,49 +416,53 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     q = q.copy()
     for i in tree.floating_joints:
         quaternion = q[..., tree.q_index[i] + 3 : tree.q_index[i] + 7]
-        quaternion[...] = unit_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
+        quaternion[...] = normalise_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
     return q
 
 
-def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    if (named := by_name(value, what)) is not None:
-        return coordinate_layout(tree, what).read(named)
-    array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
+def parse_numbers(tree: KinematicTree, value: ConfigurationLike, symbol: str) -> FloatArray:
+    if (named := as_text_or_mapping(value, symbol)) is not None:
+        return coordinate_layout(tree, symbol).parse(named)
+    array, width = as_floats(cast("ArrayLike", value), symbol), tree.nq if symbol == "q" else tree.nv
     if array.shape[-1:] != (width,):
-        names = ", ".join(_names(tree, what)) or "none, no joint moves"
-        instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
+        names = ", ".join(_names(tree, symbol)) or "none, no joint moves"
+        hint = _hints_by_length(tree, symbol).get(array.shape[-1]) if array.ndim else None
         raise InputError(
-            f"{what} needs {width} numbers for {tree.name}: {names}",
+            f"{symbol} needs {width} numbers for {tree.name}: {names}",
             found=f"shape {array.shape}",
-            remedy=instead and instead.remedy,
-            question=instead.question if instead else QuestionsSection.JOINT_ORDER,
+            remedy=hint and hint.remedy,
+            question=hint.question if hint else QuestionsSection.JOINT_ORDER,
         )
     return array
 
 
-def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Parse q, v or a; normalise the quaternions of q, and warn of degrees if `look` is true."""
-    array = numbers(tree, value, what)
-    if what != "q":
+def parse_and_normalise(
+    tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
+) -> FloatArray:
+    """Parse q, v or a; normalise the quaternions of q, and warn of degrees if `warn` is true."""
+    array = parse_numbers(tree, value, symbol)
+    if symbol != "q":
         return array
-    if look:
+    if warn:
         warn_of_degrees(tree, array)
     return with_unit_quaternions(tree, array)
 
 
-def checked(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the result of `shaped`; raise NotFiniteError if a number is not finite."""
-    array = shaped(tree, value, what, look=look)
+def parse_finite(
+    tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
+) -> FloatArray:
+    """Return the result of `parse_and_normalise`; raise NotFiniteError if a number is not finite."""
+    array = parse_and_normalise(tree, value, symbol, warn=warn)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
         raise NotFiniteError(
-            f"{what} must be finite", where=_names(tree, what)[where[-1]], found=str(array[tuple(where)])
+            f"{symbol} must be finite", where=_names(tree, symbol)[where[-1]], found=str(array[tuple(where)])
         )
     return array
 
 
-def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    return coordinate_names(tree) if what == "q" else rate_names(tree)
+def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
+    return coordinate_names(tree) if symbol == "q" else velocity_names(tree)
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
@@ -450,44 +477,44 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
         values = q[..., at]
         if joint.mimic:
             values = joint.mimic.multiplier * values + joint.mimic.offset
-        lower, upper = _rounded_outwards(joint.limit)
+        lower, upper = _widen_limits(joint.limit)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
             bounds = f"[{joint.limit.lower:.6g}, {joint.limit.upper:.6g}]"
-            yield joint, f"joint {joint.name}: {worst:.6g} is outside {bounds}{_degrees(joint, worst)}"
+            yield joint, f"joint {joint.name}: {worst:.6g} is outside {bounds}{_degrees_hint(joint, worst)}"
 
 
-def _degrees(joint: Joint, value: float) -> str:
-    if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
+def _degrees_hint(joint: Joint, value: float) -> str:
+    if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > MAX_PLAUSIBLE_ANGLE):
         return ""
-    lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
+    lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
     if lower <= value <= upper or not joint.limit.lower <= math.radians(value) <= joint.limit.upper:
         return ""
     return f"; degrees? write {value:.6g}deg"
 
 
 #: Maximum number of configurations that are checked for degrees; a whole batch has the same unit.
-_MOST_CHECKED = 16
+_MAX_CHECKED = 16
 
 
-def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
+def degrees_messages(tree: KinematicTree, q: FloatArray) -> list[str]:
     """Return `limit_violations` of values that look like degrees; check at most 16 configurations."""
-    if tree.least_implausible == math.inf or not q.size:
+    if tree.min_implausible_angle == math.inf or not q.size:
         return []
     if q.ndim == 2:
-        q = q[:: -(-len(q) // _MOST_CHECKED)]
+        q = q[:: -(-len(q) // _MAX_CHECKED)]
     elif q.ndim > 2:
-        most = max(1, int(_MOST_CHECKED ** (1.0 / (q.ndim - 1))))
+        most = max(1, int(_MAX_CHECKED ** (1.0 / (q.ndim - 1))))
         q = q[tuple(slice(None, None, -(-size // most)) for size in q.shape[:-1])]
     flat = q.ravel()  # For a short array, argmax is several times faster than max.
-    if not max(flat.item(flat.argmax()), -flat.item(flat.argmin())) > tree.least_implausible:
+    if not max(flat.item(flat.argmax()), -flat.item(flat.argmin())) > tree.min_implausible_angle:
         return []
     return [words for joint, words in _violations(tree, q) if not joint.mimic and "; degrees? " in words]
 
 
 def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
-    if lines := degrees_lines(tree, q):
+    if lines := degrees_messages(tree, q):
         more = f" ({len(lines) - 1} more joints likewise)" if len(lines) > 1 else ""
         advice = "q is in radians; numpy.radians converts degrees"
         warn_caller(f"{tree.name}: {lines[0]}{more}: {advice}; {QuestionsSection.DEGREES}", DegreesWarning)
@@ -496,19 +523,19 @@ def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
 # -- Pinocchio's layout ------------------------------------------------------------------------------
 
 
-def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
+def _is_in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
     return joint.kind.nq > 0 and not (mimic and joint.mimic)
 
 
 def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
-    present = (joint.kind for joint in tree.joints if _in_pinocchio(joint, mimic=mimic))
+    present = (joint.kind for joint in tree.joints if _is_in_pinocchio(joint, mimic=mimic))
     return sum(kind.nq_pinocchio for kind in present)
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     blocks = [np.zeros((*q.shape[:-1], 0))]
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
-        if not _in_pinocchio(joint, mimic=mimic):
+        if not _is_in_pinocchio(joint, mimic=mimic):
             continue
         own = q[..., at : at + joint.kind.nq]
         if joint.mimic:
@@ -539,10 +566,10 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
         )
     own, mimic_joints, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
     for i, joint in enumerate(tree.joints):
-        if not _in_pinocchio(joint, mimic=mimic):
+        if not _is_in_pinocchio(joint, mimic=mimic):
             continue
         size = joint.kind.nq_pinocchio
-        values = _angle_back(joint, q[..., at : at + size])
+        values = _angle_of_pair(joint, q[..., at : at + size])
         at += size
         if joint.mimic:
             mimic_joints.append((joint, tree.q_index[i], values))
@@ -553,7 +580,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
     return own
 
 
-def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
+def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
     if joint.kind.nq_pinocchio == joint.kind.nq:
         return values
     cosine, sine = values[..., -2], values[..., -1]
@@ -588,7 +615,7 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
 # -- random samples --------------------------------------------------------------------------------------
 
 #: Largest sampled coordinate (m) of the position of a planar or floating joint.
-_RANGE = 2.0
+_MAX_POSITION = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -617,54 +644,56 @@ def _uniform(
         if joint.nq == 1:
             q[:, at] = rng.uniform(*ranges[joint.name], (n, 1))[:, 0]
         elif joint.nq:
-            q[:, at : at + joint.nq] = _SAMPLED[joint.kind](n, rng)
+            q[:, at : at + joint.nq] = _SAMPLERS[joint.kind](n, rng)
     return q
 
 
 def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
-    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1))))
+    return np.hstack(
+        (rng.uniform(-_MAX_POSITION, _MAX_POSITION, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1)))
+    )
 
 
 def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
+    return np.hstack((rng.uniform(-_MAX_POSITION, _MAX_POSITION, (n, 3)), quaternion))
 
 
-_SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
+_SAMPLERS = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 
-def special(tree: KinematicTree) -> FloatArray:
+def special_configurations(tree: KinematicTree) -> FloatArray:
     """Return (3, nq): the zero configuration, then all joints at the lower and at the upper limit."""
     q = np.tile(neutral(tree), (3, 1))
-    ranges = own_ranges(tree)
+    ranges = joint_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1:
             q[1, at], q[2, at] = ranges[joint.name]
     return q
 
 
-def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link, with velocities and accelerations as in `draw`."""
+def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
+    """Return random motions of the root link, with velocities and accelerations as in `draw_samples`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
-    placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
+    placement[:, :3, :3], placement[:, :3, 3] = rotation_from_quaternion(placed[:, 3:]), placed[:, :3]
     velocity, acceleration = rng.standard_normal((2, n, 6))
     velocity[::8] *= 100.0
     acceleration[::8] *= 100.0
     return BaseMotion(placement, velocity, acceleration)
 
 
-def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
+def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
+    """Return samples for a validation: `n` random ones and, if requested, `special_configurations`.
 
     The samples cover each joint's own range, even if a mimic joint then exceeds its limits, because the
     equations are valid beyond the limits too. Every eighth sample has a hundred times larger velocities and
     accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """
-    q = _uniform(tree, n, rng, own_ranges(tree))
+    q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_special:
-        q = np.concatenate((special(tree), q))
+        q = np.concatenate((special_configurations(tree), q))
     v, a = rng.standard_normal((2, len(q), tree.nv))
     v[::8] *= 100.0
     a[::8] *= 100.0

@@ -26,15 +26,15 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import FloatArray, floats
+from urdfkin.kinematics.inputs import FloatArray, as_floats
 
 #: Types that q, v and a may have. Text is included, because `ArrayLike` contains `str`.
-Given = ArrayLike | Mapping[str, ArrayLike]
+ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
-_LISTED = 8
+_MAX_NAMES = 8
 #: Pattern of the blank between a number and its unit.
-_UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
-_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
+_BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
+_BLANKS_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
 
 class Hint(NamedTuple):
@@ -47,64 +47,65 @@ class CoordinateLayout:
     """Names and units of the numbers of q, v or a.
 
     Attributes:
-        what: "q", "v" or "a".
+        symbol: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
-        otherwise: Returns a hint for each joint without a coordinate, such as a fixed joint.
-        lengths: Returns a hint for wrong lengths that users often pass, such as the length of Pinocchio's q.
+        hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
+        hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of
+            Pinocchio's q.
     """
 
-    what: str
+    symbol: str
     names: tuple[str, ...]
     units: tuple[str | None, ...]
     spans: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     poses: Callable[[], Mapping[str, FloatArray]] = dict
-    otherwise: Callable[[], Mapping[str, Hint]] = dict
-    lengths: Callable[[], Mapping[int, Hint]] = dict
+    hints_by_name: Callable[[], Mapping[str, Hint]] = dict
+    hints_by_length: Callable[[], Mapping[int, Hint]] = dict
 
-    def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
+    def parse(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
         """Return the numbers (..., n) of q, v or a that a text or a mapping describes.
 
         An unknown name raises UnknownNameError; any other invalid input raises InputError.
 
         >>> rest = {"neutral": np.zeros(2)}
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
-        >>> arm.read("neutral, elbow=2").tolist(), arm.read({"elbow": [1, 2], "shoulder": 0.5}).tolist()
+        >>> arm.parse("neutral, elbow=2").tolist(), arm.parse({"elbow": [1, 2], "shoulder": 0.5}).tolist()
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
-        >>> arm.read("elbow=30deg")
+        >>> arm.parse("elbow=30deg")
         Traceback (most recent call last):
         urdfkin.errors.InputError: q: no value for shoulder; give a value for each joint, or begin \
 with 'neutral, elbow=...'
         """
-        where = where or self.what
-        if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
-            return self._in_order(cells, where)
-        values, pose = self.named(value, where)
-        return self._by_name(values, where, pose)
+        where = where or self.symbol
+        if not isinstance(value, Mapping) and self._is_in_order(cells := _split_cells(value)):
+            return self._parse_in_order(cells, where)
+        values, pose = self.parse_by_name(value, where)
+        return self._combine_values(values, where, pose)
 
-    def named(
+    def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
         """Return the values of a text or mapping by name, and the named pose (n,) or None.
 
         A text such as `ready, elbow=pi/2` begins with the name of a pose.
 
-        >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
+        >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
         """
         if isinstance(value, Mapping):
             return dict(value), None
-        cells, pose = _cells(value), None
+        cells, pose = _split_cells(value), None
         if not cells:
             return {}, None
         if self._is_in_order(cells):
             raise InputError("give each number with its name", where=where, found=repr(value.strip()[:60]))
-        named = [_pair(cell) for cell in cells]
-        if named[0][0] is None:
-            pose = self._pose(cells[0], where)
-            named = named[1:]
+        pairs = [_split_pair(cell) for cell in cells]
+        if pairs[0][0] is None:
+            pose = self._find_pose(cells[0], where)
+            pairs = pairs[1:]
         values: dict[str, ArrayLike] = {}
-        for name, number in named:
+        for name, number in pairs:
             if name is None or name in values:
                 wrong = f"{name!r} twice" if name else repr(number[:60])
                 raise InputError(
@@ -115,48 +116,52 @@ with 'neutral, elbow=...'
 
     @staticmethod
     def _is_in_order(cells: Sequence[str]) -> bool:
-        is_pose = len(cells) == 1 and _is_word(cells[0])
-        return not is_pose and all(_pair(cell)[0] is None for cell in cells)
+        is_pose = len(cells) == 1 and _is_pose_name(cells[0])
+        return not is_pose and all(_split_pair(cell)[0] is None for cell in cells)
 
-    def demand_names(self, names: Sequence[str], where: str) -> None:
+    def check_names(self, names: Sequence[str], where: str) -> None:
         """Raise an error if a name is neither a coordinate nor a joint with several coordinates."""
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
-                raise self._not_a_coordinate(name, where)
+                raise self._unknown_name_error(name, where)
 
-    def _pose(self, word: str, where: str) -> FloatArray:
+    def _find_pose(self, word: str, where: str) -> FloatArray:
         poses = self.poses()
         if word not in poses:
             raise UnknownNameError("pose", word[:60], poses, where=where)
         return poses[word]
 
-    def _in_order(self, cells: Sequence[str], where: str) -> FloatArray:
+    def _parse_in_order(self, cells: Sequence[str], where: str) -> FloatArray:
         if len(cells) != len(self.names):
-            hint = self.lengths().get(len(cells))
-            raise wrong_count(self.names, len(cells), where, **hint._asdict() if hint else {})
+            hint = self.hints_by_length().get(len(cells))
+            raise wrong_count_error(self.names, len(cells), where, **hint._asdict() if hint else {})
         rows = zip(cells, self.names, self.units, strict=True)
-        return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
+        return np.array(
+            [self._parse_number(text, f"{where}, {name}", unit) for text, name, unit in rows], float
+        )
 
-    def _by_name(self, values: dict[str, ArrayLike], where: str, rest: FloatArray | None) -> FloatArray:
-        found: dict[int, FloatArray] = {}
+    def _combine_values(
+        self, values: dict[str, ArrayLike], where: str, pose: FloatArray | None
+    ) -> FloatArray:
+        columns: dict[int, FloatArray] = {}
         index = {name: i for i, name in enumerate(self.names)}
         for name, value in values.items():
             if name in index:
                 i = index[name]
-                place = f"{where}, {name}"
-                number = self._number(value, place, self.units[i]) if isinstance(value, str) else value
-                found[i] = floats(number, place)
+                label = f"{where}, {name}"
+                number = self._parse_number(value, label, self.units[i]) if isinstance(value, str) else value
+                columns[i] = as_floats(number, label)
             else:
-                found |= self._of_a_joint(name, value, where)
-        missing = [name for i, name in enumerate(self.names) if i not in found]
-        if missing and rest is None:
+                columns |= self._parse_joint(name, value, where)
+        missing = [name for i, name in enumerate(self.names) if i not in columns]
+        if missing and pose is None:
             begin = f"'neutral, {next(iter(values), missing[0])}=...'"
             raise InputError(
-                f"no value for {listed(missing)}",
+                f"no value for {join_names(missing)}",
                 where=where,
                 remedy=f"give a value for each joint, or begin with {begin}",
             )
-        shapes = [x.shape for x in found.values()]
+        shapes = [x.shape for x in columns.values()]
         try:
             shape = np.broadcast_shapes(*shapes)
         except ValueError:
@@ -164,40 +169,42 @@ with 'neutral, elbow=...'
                 "the batches have different shapes", where=where, found=safe_repr(shapes)
             ) from None
         out = np.empty((*shape, len(self.names)))
-        out[...] = 0.0 if rest is None else rest
-        for i, x in found.items():
+        out[...] = 0.0 if pose is None else pose
+        for i, x in columns.items():
             out[..., i] = x
         return out
 
-    def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
+    def _parse_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
         if not isinstance(name, str) or name not in self.spans:
-            raise self._not_a_coordinate(name, where)
+            raise self._unknown_name_error(name, where)
         at, size = self.spans[name]
-        x = floats(value, f"{where}, {name}")
+        x = as_floats(value, f"{where}, {name}")
         if x.shape[-1:] != (size,):
             names, count = self.names[at : at + size], (x.shape or (1,))[-1]
-            raise wrong_count(names, count, f"{where}, {name}", question=QuestionsSection.FLOATING_BASES)
+            raise wrong_count_error(
+                names, count, f"{where}, {name}", question=QuestionsSection.FLOATING_BASES
+            )
         return {at + k: x[..., k] for k in range(size)}
 
-    def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
-        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
+    def _unknown_name_error(self, name: object, where: str) -> InputError | UnknownNameError:
+        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.symbol, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
-        if (hint := self.otherwise().get(name)) is not None:
+        if (hint := self.hints_by_name().get(name)) is not None:
             return InputError(f"{name!r} is not a {kind}", where=where, **hint._asdict())
         return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
 
-    def _number(self, text: str, where: str, unit: str | None) -> float:
-        found = parse_quantity(text)
-        value = parse_float(text) if found is None else found.value
+    def _parse_number(self, text: str, where: str, unit: str | None) -> float:
+        quantity = parse_quantity(text)
+        value = parse_float(text) if quantity is None else quantity.value
         if value is None:
             hint = remedy(text) or "write 0.5, 30deg, pi/2 or 5mm"
             raise InputError("not a finite number", where=where, found=repr(text.strip()[:60]), remedy=hint)
-        if found is None:
+        if quantity is None:
             return value
-        order = "qva".index(self.what)
-        other = unit is not None and found.unit not in (None, unit)
-        if other or found.per not in (0, order):
+        order = "qva".index(self.symbol)
+        other = unit is not None and quantity.unit not in (None, unit)
+        if other or quantity.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
             per = ("", ", or these units per s", ", or these units per s^2")[order]
             hint = f"use {kinds}{per}"
@@ -205,11 +212,11 @@ with 'neutral, elbow=...'
         return value
 
 
-def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
+def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[str, ArrayLike] | None:
     """Return text or a mapping unchanged, a table with labels as a mapping, and None for other values.
 
-    >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
-    (None, 'ready', {'elbow': 0.5})
+    >>> [as_text_or_mapping(value, "q") for value in ([0.5, 0.1], "ready", {"elbow": 0.5})]
+    [None, 'ready', {'elbow': 0.5}]
     """
     if isinstance(value, np.ndarray):
         return None
@@ -226,7 +233,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
         return None
     labels = _labels(value)
     if twice := [safe_repr(label) for label, count in Counter(labels).items() if count > 1]:
-        raise InputError("a label occurs twice", where=where, found=listed(twice))
+        raise InputError("a label occurs twice", where=where, found=join_names(twice))
     table: Any = value
     return {label: table[label] for label in labels} or None
 
@@ -243,16 +250,16 @@ def _labels(value: object) -> list[Any]:
     return [] if labels == list(range(len(labels))) else labels
 
 
-def wrong_count(
+def wrong_count_error(
     names: Sequence[str],
     count: int,
     where: str,
     remedy: str | None = None,
     question: QuestionsSection = QuestionsSection.JOINT_ORDER,
 ) -> InputError:
-    without = f", none for {listed(names[count:])}" if count < len(names) else ""
+    without = f", none for {join_names(names[count:])}" if count < len(names) else ""
     return InputError(
-        f"{len(names)} numbers are expected ({listed(names) or 'none: no joint moves'})",
+        f"{len(names)} numbers are expected ({join_names(names) or 'none: no joint moves'})",
         where=where,
         found=f"{count}{without}",
         remedy=remedy,
@@ -260,28 +267,28 @@ def wrong_count(
     )
 
 
-def listed(names: Sequence[str]) -> str:
-    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
-    return ", ".join(map(str, names[:_LISTED])) + more
+def join_names(names: Sequence[str]) -> str:
+    more = f", ... ({len(names)} in all)" if len(names) > _MAX_NAMES else ""
+    return ", ".join(map(str, names[:_MAX_NAMES])) + more
 
 
-def _cells(text: str) -> list[str]:
+def _split_cells(text: str) -> list[str]:
     """Split a text at commas, or at blanks if the text has no commas."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()
     if "," in text:
         return [cell.strip() for cell in text.removesuffix(",").split(",")]
-    return _UNIT_APART.sub("", _AROUND_SIGNS.sub(r"\1", text)).split()
+    return _BLANK_BEFORE_UNIT.sub("", _BLANKS_AROUND_SIGNS.sub(r"\1", text)).split()
 
 
-def _pair(cell: str) -> tuple[str | None, str]:
+def _split_pair(cell: str) -> tuple[str | None, str]:
     """Split a text such as "joint_1=0.5" into name and number; without `=`, the name is None."""
     name, equals, number = cell.rpartition("=")
     return (name.strip(), number.strip()) if equals else (None, cell)
 
 
-def _is_word(text: str) -> bool:
+def _is_pose_name(text: str) -> bool:
     """Return whether a text can be the name of a pose.
 
     Such a text begins with a letter, contains no `=`, and does not look like a number.

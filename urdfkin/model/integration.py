@@ -14,7 +14,13 @@ import math
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import exp_rotation, log_rotation, quaternion_of, rotation_of, skew
+from urdfkin.kinematics.rotation import (
+    exp_rotation,
+    log_rotation,
+    quaternion_of,
+    rotation_from_quaternion,
+    skew,
+)
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Largest squared angle (rad^2) for which a series replaces (|w| - sin|w|)/|w|^3, to avoid cancellation.
@@ -25,19 +31,19 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the configuration (..., nq) that `q` reaches in one second at constant velocities `v`."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
-    for joint, at, to in _coordinate_joints(tree):
-        step = v[..., to : to + joint.nv]
+    for joint, q_index, v_index in _coordinate_joints(tree):
+        step = v[..., v_index : v_index + joint.nv]
         if joint.nq == 1:
-            out[..., at] += step[..., 0]
+            out[..., q_index] += step[..., 0]
             continue
-        here = out[..., at : at + joint.nq]
-        p, R = _pose(joint, here)
+        block = out[..., q_index : q_index + joint.nq]
+        p, R = _pose(joint, block)
         s, w = _screw(joint, step)
         p = p + (R @ (_V(w) @ s[..., np.newaxis]))[..., 0]
         if joint.kind is JointKind.PLANAR:
-            here[...] = np.concatenate((p[..., :2], here[..., 2:] + w[..., 2:]), axis=-1)
+            block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
         else:
-            here[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
+            block[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
     return out
 
 
@@ -49,21 +55,21 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
     v = np.empty((*shape, tree.nv))
-    for joint, at, to in _coordinate_joints(tree):
-        one, other = (q[..., at : at + joint.nq] for q in (start, end))
+    for joint, q_index, v_index in _coordinate_joints(tree):
+        q_0, q_1 = (q[..., q_index : q_index + joint.nq] for q in (start, end))
         if joint.nq == 1:
-            way = other[..., 0] - one[..., 0]
-            v[..., to] = _shortest(way) if joint.kind is JointKind.CONTINUOUS else way
+            change = q_1[..., 0] - q_0[..., 0]
+            v[..., v_index] = _shortest(change) if joint.kind is JointKind.CONTINUOUS else change
             continue
-        (p_0, R_0), (p_1, R_1) = _pose(joint, one), _pose(joint, other)
-        back = np.swapaxes(R_0, -1, -2)
-        w = log_rotation(back @ R_1)
+        (p_0, R_0), (p_1, R_1) = _pose(joint, q_0), _pose(joint, q_1)
+        R_0_inverse = np.swapaxes(R_0, -1, -2)
+        w = log_rotation(R_0_inverse @ R_1)
         if joint.kind is JointKind.PLANAR:
             w = np.zeros((*shape, 3))
-            w[..., 2] = _shortest(other[..., 2] - one[..., 2])
-        s = np.linalg.solve(_V(w), back @ (p_1 - p_0)[..., np.newaxis])[..., 0]
-        six = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
-        v[..., to : to + joint.nv] = np.concatenate(six, axis=-1)
+            w[..., 2] = _shortest(q_1[..., 2] - q_0[..., 2])
+        s = np.linalg.solve(_V(w), R_0_inverse @ (p_1 - p_0)[..., np.newaxis])[..., 0]
+        parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
+        v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
     return v
 
 
@@ -77,26 +83,26 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
-    return [(joint, at, to) for joint, at, to in rows if joint.nv]
+    return [(joint, q_index, v_index) for joint, q_index, v_index in rows if joint.nv]
 
 
-def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
-    p, orientation = _screw(joint, own)
-    return p, (rotation_of if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+    p, orientation = _screw(joint, block)
+    return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
 
 
-def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the linear and angular part of a planar or floating joint's coordinates or velocity.
 
     The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
     """
     if joint.kind is JointKind.FLOATING:
-        return own[..., :3], own[..., 3:]
+        return block[..., :3], block[..., 3:]
     if joint.kind is not JointKind.PLANAR:
         raise NotImplementedError(f"the motion of a {joint.kind} joint")
-    linear, angular = np.zeros((2, *own.shape[:-1], 3))
-    linear[..., :2], angular[..., 2] = own[..., :2], own[..., 2]
+    linear, angular = np.zeros((2, *block.shape[:-1], 3))
+    linear[..., :2], angular[..., 2] = block[..., :2], block[..., 2]
     return linear, angular
 
 
@@ -104,11 +110,11 @@ def _V(w: FloatArray) -> FloatArray:
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
     half = np.sinc(angle / math.tau)
-    summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
-    cubed = np.where(
-        square < _SERIES_BELOW, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
+    series = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
+    coefficient = np.where(
+        square < _SERIES_BELOW, series, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
     )
-    V: FloatArray = np.eye(3) + 0.5 * half**2 * W + cubed * (W @ W)
+    V: FloatArray = np.eye(3) + 0.5 * half**2 * W + coefficient * (W @ W)
     return V
 
 

@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.model.configuration import numbers
-from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
+from urdfkin.model.configuration import parse_numbers
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,14 @@ class Coupling:
     def matrix(self) -> FloatArray:
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
-        return frozen(G)
+        return freeze(G)
 
     @cached_property
     def offset(self) -> FloatArray:
         """The vector g (joints,): the joint values if every coordinate is zero."""
-        return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
+        return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
-    def layout(self, what: str = "q") -> CoordinateLayout:
+    def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
@@ -65,21 +65,22 @@ class Coupling:
             if mimic
         }
         neutral = {"neutral": np.zeros(len(self.names))}
-        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: hints)
+        return CoordinateLayout(symbol, self.names, own, poses=lambda: neutral, hints_by_name=lambda: hints)
 
-    def values(self, q: Given) -> FloatArray:
+    def values(self, q: ConfigurationLike) -> FloatArray:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
-        coordinates = self.checked(q, "q")
+        coordinates = self.parse(q, "q")
         # Each row of G contains only one number that is not zero, so no matrix product is needed.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
-    def checked(self, array: Given, what: str) -> FloatArray:
-        if (named := by_name(array, what)) is not None:
-            return self.layout(what).read(named)
+    def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
+        if (by_name := as_text_or_mapping(array, symbol)) is not None:
+            return self.layout(symbol).parse(by_name)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
+            names = ", ".join(self.names) or "none"
             raise InputError(
-                f"{what} needs {len(self.names)} values on its last axis: {', '.join(self.names) or 'none'}",
+                f"{symbol} needs {len(self.names)} values on its last axis: {names}",
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
             )
@@ -92,7 +93,7 @@ class Coupling:
 
     @cached_property
     def _multiplier(self) -> FloatArray:
-        return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
+        return freeze([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
@@ -100,10 +101,10 @@ class Coupling:
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
-    def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        return numbers(tree, q, "q")[..., list(self.q_index(tree))]
+    def select(self, tree: KinematicTree, q: ConfigurationLike) -> FloatArray:
+        return parse_numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
-def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
+def make_coupling(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

@@ -43,10 +43,10 @@ class ElementaryMotion:
 class Path:
     """A product of constant poses (4, 4) and elementary motions, first to last.
 
-    >>> arm = Path((ElementaryMotion(2, turns=True), elementary(0, False, 2.0)))
+    >>> arm = Path((ElementaryMotion(2, turns=True), elementary_pose(0, False, 2.0)))
     >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
     [0.0, 2.0, 0.0]
-    >>> arm.columns([0.0])[1].ravel().tolist()
+    >>> arm.pose_and_jacobian([0.0])[1].ravel().tolist()
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
 
@@ -69,7 +69,7 @@ class Path:
         for step in self.steps:
             if isinstance(step, ElementaryMotion):
                 if moving[k]:
-                    T = _moved(T, step, amounts[..., k])
+                    T = _apply_motion(T, step, amounts[..., k])
                 k += 1
             else:
                 T = T @ step
@@ -83,11 +83,11 @@ class Path:
             pass
         return np.array(T)
 
-    def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def pose_and_jacobian(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular]."""
-        return self.columns_at(self.frames(amounts))
+        return self.pose_and_jacobian_from_frames(self.frames(amounts))
 
-    def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
         # A motion does not move its own axis, so the axis is also fixed in the frame after the motion.
@@ -103,14 +103,14 @@ class Path:
         return T, columns
 
 
-def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
+def elementary_pose(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
     """Return the poses (..., 4, 4) of rotations (rad) about, or translations (m) along, a coordinate axis."""
     amount = np.asarray(amount, np.float64)
     T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
-    return _moved(T, ElementaryMotion(axis, turns), amount) if amount.any() else T
+    return _apply_motion(T, ElementaryMotion(axis, turns), amount) if amount.any() else T
 
 
-def _moved(T: FloatArray, motion: ElementaryMotion, amount: FloatArray) -> FloatArray:
+def _apply_motion(T: FloatArray, motion: ElementaryMotion, amount: FloatArray) -> FloatArray:
     moved = np.array(T)
     if motion.turns:
         moved[..., :3, :3] = T[..., :3, :3] @ coordinate_rotation(motion.axis, amount)

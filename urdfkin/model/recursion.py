@@ -1,7 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
 The kind of number depends on the attribute `Recursion.eq`. This attribute contains the textbook's equations;
-`urdfkin.kinematics.arithmetic.bound` makes them for a kind of number.
+`urdfkin.kinematics.arithmetic.bind_equations` makes them for a kind of number.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from urdfkin.model.reference import Reference
 Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
-Six = tuple[Number, ...]
+SixVector = tuple[Number, ...]
 #: The slice of q, v or a that begins with the joint's first number.
-Numbers = Sequence[Number]
+JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
 IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class LinkState:
     """The position, velocity and acceleration of a link's frame.
 
     R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
-    axes if `Recursion.own` is True, and in world axes otherwise.
+    axes if `Recursion.own_axes` is True, and in world axes otherwise.
     """
 
     R: Matrix = IDENTITY
@@ -46,14 +46,14 @@ class Column:
     Attributes:
         carrier: State of the frame that the joint's axis is fixed to.
         order: Position of the joint on the path, counted from the base.
-        place: Index of the joint velocity in v.
+        v_index: Index of the joint velocity in v.
     """
 
     z: Vector
     turns: bool
-    carrier: State
+    carrier: LinkState
     order: int
-    place: int
+    v_index: int
     factor: Number
 
 
@@ -61,61 +61,63 @@ class Column:
 class Recursion:
     """Steps of the recursion: each step computes a link's state from the state of the previous link.
 
-    Velocities and accelerations are expressed in each link's own axes if `own` is True, and in world axes
-    otherwise.
+    Velocities and accelerations are expressed in each link's own axes if `own_axes` is True, and in world
+    axes otherwise.
     """
 
     eq: Any
-    own: bool = False
+    own_axes: bool = False
 
-    def seen(self, s: State, x: Vector) -> Vector:
-        return x if self.own else self.eq.rotate(s.R, x)
+    def express(self, s: LinkState, x: Vector) -> Vector:
+        return x if self.own_axes else self.eq.rotate(s.R, x)
 
-    def carried(self, s: State, d: Vector) -> State:
+    def translate_frame(self, s: LinkState, d: Vector) -> LinkState:
         """Return the state of the point at the offset d from the link's origin (7.58, 7.128, 7.130)."""
-        eq, lever = self.eq, self.seen(s, d)
+        eq, lever = self.eq, self.express(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
-    def turned(self, s: State, S: Matrix) -> State:
+    def rotate_frame(self, s: LinkState, S: Matrix) -> LinkState:
         """Return the state of a frame that is fixed to the same body, but rotated by S."""
         R = self.eq.product(s.R, S)
-        if not self.own:
+        if not self.own_axes:
             return replace(s, R=R)
         back = self.eq.transposed(S)
-        return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
+        return LinkState(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
-    def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
+    def after_revolute(self, s: LinkState, axis: Vector, S: Matrix, v: Number, a: Number) -> LinkState:
         """Return the state of the link after a revolute joint with rotation matrix S (7.129, 7.127)."""
-        z = self.seen(s, axis)
+        z = self.express(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
-        return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
+        return self.rotate_frame(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
-    def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
+    def after_prismatic(self, s: LinkState, axis: Vector, x: Number, v: Number, a: Number) -> LinkState:
         """Return the state of the link after a prismatic joint (7.64, 7.130, 7.128)."""
-        s = self.carried(s, self.eq.times(x, axis))
-        z = self.seen(s, axis)
+        s = self.translate_frame(s, self.eq.times(x, axis))
+        z = self.express(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
-    def planar(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
+    def after_planar(self, s: LinkState, q: JointSlice, S: Matrix, v: JointSlice, a: JointSlice) -> LinkState:
         """Return the state of the link after a planar joint; S is the joint's rotation matrix."""
         rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
-        return self._free(s, (q[0], q[1], 0), S, rates)
+        return self._after_free_joint(s, (q[0], q[1], 0), S, rates)
 
-    def floating(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
+    def after_floating(
+        self, s: LinkState, q: JointSlice, S: Matrix, v: JointSlice, a: JointSlice
+    ) -> LinkState:
         """Return the state of the link after a floating joint; S is the joint's rotation matrix."""
         rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
-        return self._free(s, (q[0], q[1], q[2]), S, rates)
+        return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
-    def _free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
+    def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
         """Return the state of the link after a planar or floating joint.
 
         `rates` contains the joint's linear and angular velocity, then its linear and angular acceleration.
         All four vectors are expressed in the child link's axes.
         """
-        eq, s = self.eq, self.turned(self.carried(s, slide), S)
-        u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
+        eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
+        u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
         return replace(
             s,
             w=eq.plus(s.w, o),
@@ -126,19 +128,19 @@ class Recursion:
 
     # -- quantities of a frame; columns are in the world's axes --------------------------------------
 
-    def velocity(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
+    def velocity(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and the angular velocity of a frame (7.127, 7.128)."""
         if not reference.at_world:
             return s.vel, s.w
         return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)), s.w
 
-    def acceleration(self, s: State, reference: Reference) -> tuple[Vector, Vector]:
+    def acceleration(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
         """Return the linear and the angular classical acceleration of a frame (7.129, 7.130)."""
         if not reference.at_world:
             return s.acc, s.alpha
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
-    def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
+    def in_reference(self, s: LinkState, reference: Reference, linear: Vector, angular: Vector) -> SixVector:
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -150,19 +152,23 @@ class Recursion:
         six: tuple[Vector, Vector] = self.eq.turning_column(column.z, self.eq.minus(to, column.carrier.p))
         return six
 
-    def jacobian(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
+    def jacobian(
+        self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
+    ) -> list[SixVector]:
         """Return the columns of the Jacobian (7.85), one for each joint velocity."""
         to = ZERO if reference.at_world else s.p
         return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
 
-    def jacobian_rate(self, s: State, columns: Sequence[Column], nv: int, reference: Reference) -> list[Six]:
+    def jacobian_rate(
+        self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
+    ) -> list[SixVector]:
         """Return the columns of the Jacobian's time derivative (7.126)."""
         to, to_rate = (ZERO, ZERO) if reference.at_world else (s.p, s.vel)
         rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
         return self._add_mimic_columns(s, reference, nv, rates)
 
     def _rate(
-        self, s: State, column: Column, to: Vector, to_rate: Vector, reference: Reference
+        self, s: LinkState, column: Column, to: Vector, to_rate: Vector, reference: Reference
     ) -> tuple[Vector, Vector]:
         eq, carrier, (linear, angular) = self.eq, column.carrier, self._column(column, to)
         rate, turning = eq.axis_rate(carrier.w, column.z), ZERO
@@ -175,20 +181,20 @@ class Recursion:
         return rate, turning
 
     def _add_mimic_columns(
-        self, s: State, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
-    ) -> list[Six]:
+        self, s: LinkState, reference: Reference, nv: int, columns: Iterator[tuple[Column, Vector, Vector]]
+    ) -> list[SixVector]:
         """Add the column of each mimic joint to the mimicked joint's column."""
-        out: list[Six] = [(0,) * 6] * nv
-        for column, linear, angular in found:
+        out: list[SixVector] = [(0,) * 6] * nv
+        for column, linear, angular in columns:
             six = self.in_reference(s, reference, linear, angular)
-            out[column.place] = tuple(
-                x + column.factor * y for x, y in zip(out[column.place], six, strict=True)
+            out[column.v_index] = tuple(
+                x + column.factor * y for x, y in zip(out[column.v_index], six, strict=True)
             )
         return out
 
     def hessian(
-        self, s: State, columns: Sequence[Column], reference: Reference
-    ) -> Iterator[tuple[int, int, Number, Six]]:
+        self, s: LinkState, columns: Sequence[Column], reference: Reference
+    ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
         Each tuple contains the indices of the column and the coordinate in v, a factor, and the derivative
@@ -199,7 +205,7 @@ class Recursion:
         for of, six in ends:
             for by, by_six in ends:
                 change = self._change(six, by_six, reference, before=by.order <= of.order)
-                yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
+                yield of.v_index, by.v_index, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
         """Return the derivative of the Jacobian column `six` with respect to the coordinate of column `by`.

@@ -6,38 +6,38 @@ import math
 from collections.abc import Iterator, Sequence
 
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.model.configuration import narrowed_ranges
+from urdfkin.model.configuration import range_reductions
 from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Indices of the left-aligned columns in the table of `described`. Its first columns are link and joint.
-WORDS = (0, 1, 2, 3, 4, 5, 9)
-_WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
+#: Indices of the left-aligned columns in the table of `summarize`. Its first columns are link and joint.
+TEXT_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
+_JOINT_TEXT_COLUMNS = (0, 1, 2, *(i + 1 for i in TEXT_COLUMNS[2:]))
 
 
-def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
+def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
-    cells = [("",) * len(columns), *(cells_of(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
+    cells = [("",) * len(columns), *(joint_cells(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
     rows = [
         (guide + link, joint, *own)
-        for guide, link, joint, own in zip(guides(tree), tree.links, names, cells, strict=True)
+        for guide, link, joint, own in zip(tree_guides(tree), tree.links, names, cells, strict=True)
     ]
     tips = ", ".join(tree.links[leaf] for leaf in tree.leaves())
     return TextDocument(
         f"{tree.name}: nq {tree.nq}, nv {tree.nv}, {len(tree.links)} links, {len(tree.joints)} joints",
         (
             f"root {tree.links[0]}, default base {base}, default tip {tip}",
-            Table(("link", "joint", *columns), rows, left=WORDS),
-            *map(str, narrowed_ranges(tree)),
+            Table(("link", "joint", *columns), rows, left=TEXT_COLUMNS),
+            *map(str, range_reductions(tree)),
             f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
             order,
         ),
     )
 
 
-class Joints(dict[str, Joint], Displayable):
+class JointTable(dict[str, Joint], Displayable):
     """The joints of a robot by name: a dict that `print` and notebooks show as a table."""
 
     def __init__(self, tree: KinematicTree) -> None:
@@ -49,14 +49,16 @@ class Joints(dict[str, Joint], Displayable):
         columns = COLUMNS if any(joint.mimic for joint in self.values()) else COLUMNS[:-1]
         links = zip(tree.joints, tree.links[1:], strict=True)
         rows = [
-            (joint.name, tree.links[joint.parent], child, *cells_of(tree, i)[: len(columns)])
+            (joint.name, tree.links[joint.parent], child, *joint_cells(tree, i)[: len(columns)])
             for i, (joint, child) in enumerate(links)
         ]
         heads = ("joint", "parent", "child", *columns)
-        return TextDocument(f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_WORDS_OF_JOINTS)])
+        return TextDocument(
+            f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_JOINT_TEXT_COLUMNS)]
+        )
 
 
-def guides(tree: KinematicTree) -> Iterator[str]:
+def tree_guides(tree: KinematicTree) -> Iterator[str]:
     """Yield the box-drawing characters before each link name, such as `├─`; an only child has none."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
@@ -72,28 +74,28 @@ def guides(tree: KinematicTree) -> Iterator[str]:
         indents.append(indents[joint.parent] + below)
 
 
-def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
+def joint_cells(tree: KinematicTree, i: int) -> tuple[str, ...]:
     joint = tree.joints[i]
     if not joint.kind.nv:
         words = joint.kind.value if joint.lock is None else f"locked at {joint.lock.value:.6g}"
         return (words, *[""] * (len(COLUMNS) - 1))
-    q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
+    q, v = _index_text("q", tree.q_index[i], joint.kind.nq), _index_text("v", tree.v_index[i], joint.kind.nv)
     limit = joint.limit
-    limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
-    axis = axis_words(joint.axis.tolist()) if joint.kind.has_axis else ""
+    limits = ("", "", "") if limit is None else map(_limit_text, (limit.lower, limit.upper, limit.velocity))
+    axis = format_axis(joint.axis.tolist()) if joint.kind.has_axis else ""
     rule = joint.mimic
-    mimics = rule_words(rule.leader, rule.multiplier, rule.offset) if rule else ""
+    mimics = format_mimic_rule(rule.leader, rule.multiplier, rule.offset) if rule else ""
     return (joint.kind.value, axis, q, v, *limits, mimics)
 
 
-def _place(letter: str, at: int, count: int) -> str:
+def _index_text(letter: str, at: int, count: int) -> str:
     return f"{letter}[{at}]" if count == 1 else f"{letter}[{at}:{at + count}]"
 
 
-def axis_words(axis: Sequence[float]) -> str:
+def format_axis(axis: Sequence[float]) -> str:
     """Return a joint's axis as text: `z`, `-x`, or three numbers if the axis is not along a frame axis.
 
-    >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
+    >>> format_axis((0.0, -1.0, 0.0)), format_axis((0.0, 0.6, 0.8))
     ('-y', '0 0.6 0.8')
     """
     if sorted(map(abs, axis)) == [0.0, 0.0, 1.0]:
@@ -102,14 +104,14 @@ def axis_words(axis: Sequence[float]) -> str:
     return " ".join(f"{x:.4g}" for x in axis)
 
 
-def rule_words(leader: str, factor: float, offset: float) -> str:
+def format_mimic_rule(leader: str, factor: float, offset: float) -> str:
     """Return the mimic rule of a joint as text.
 
-    >>> rule_words("thumb", 2.0, -0.1), rule_words("thumb", 1.0, 0.0)
+    >>> format_mimic_rule("thumb", 2.0, -0.1), format_mimic_rule("thumb", 1.0, 0.0)
     ('2 * thumb -0.1', 'thumb')
     """
     return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
 
 
-def _bound(value: float) -> str:
+def _limit_text(value: float) -> str:
     return "" if math.isinf(value) else f"{value:.6g}"

@@ -31,7 +31,7 @@ class FrameName(str):
 
     A `FrameName` means the link or joint NAME, even if another link or joint has the name `link:NAME`.
 
-    >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
+    >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
     """
 
@@ -39,11 +39,11 @@ class FrameName(str):
     prefix: ClassVar[str]
 
     @classmethod
-    def of(cls, own: str) -> Self:
-        return cls(f"{cls.prefix}{own}")
+    def of(cls, name: str) -> Self:
+        return cls(f"{cls.prefix}{name}")
 
     @property
-    def own(self) -> str:
+    def bare_name(self) -> str:
         return self[len(self.prefix) :]
 
 
@@ -59,10 +59,10 @@ class JointFrame(FrameName):
     prefix = "joint:"
 
 
-def frozen(array: ArrayLike) -> FloatArray:
+def freeze(array: ArrayLike) -> FloatArray:
     """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
-    copy = np.array(array if numeric else inputs.floats(array, "an array"), dtype=np.float64, order="C")
+    copy = np.array(array if numeric else inputs.as_floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
@@ -75,12 +75,14 @@ class JointKind(Enum):
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
     has_axis: bool  #: Whether a joint of this kind rotates about an axis or translates along an axis.
     turns: bool
-    bounded: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
+    has_limits: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
         member = object.__new__(cls)
         member._value_ = word
-        member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
+        member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.has_limits = (
+            properties
+        )
         return member
 
     REVOLUTE = "revolute", 1, 1, 1, True, True, True
@@ -102,19 +104,19 @@ class Limit:
 
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
-LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside the limits if it exceeds a limit by more than `_OUTSIDE` (rad or m),
-#: and by more than `_OF_RANGE` times the joint's range.
-_OUTSIDE, _OF_RANGE = 0.5, 0.25
+MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
+#: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m),
+#: and by more than `_FAR_FRACTION` times the joint's range.
+_FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
-def far_outside(lower: float, upper: float) -> tuple[float, float]:
+def far_limits(lower: float, upper: float) -> tuple[float, float]:
     """Return the two values beyond which a joint value is far outside its limits.
 
-    >>> far_outside(-2.0, 2.0), far_outside(-float("inf"), 2.0)
+    >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
     """
-    far = max(_OUTSIDE, _OF_RANGE * (upper - lower)) if math.isfinite(upper - lower) else 0.0
+    far = max(_FAR_DISTANCE, _FAR_FRACTION * (upper - lower)) if math.isfinite(upper - lower) else 0.0
     return lower - far, upper + far
 
 
@@ -160,8 +162,8 @@ class Joint:
     lock: Lock | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_parent_joint", frozen(self.T_parent_joint))
-        object.__setattr__(self, "axis", frozen(self.axis))
+        object.__setattr__(self, "T_parent_joint", freeze(self.T_parent_joint))
+        object.__setattr__(self, "axis", freeze(self.axis))
         if self.T_parent_joint.shape != (4, 4) or self.axis.shape != (3,):
             raise InputError(
                 "a joint needs a (4, 4) pose and a (3,) axis",
@@ -182,14 +184,14 @@ class Joint:
         return 0 if self.mimic else self.kind.nv
 
     @property
-    def unlocked(self) -> Joint:
+    def original(self) -> Joint:
         return self.lock.joint if self.lock else self
 
     @property
     def length(self) -> float:
         """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
-        length = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
+        length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
             length += abs(self.lock.value)
         return length
@@ -223,7 +225,7 @@ class Lock:
             T[:3, :3] = rotation_about(axis, value)
         return T
 
-    def fixed(self) -> Joint:
+    def make_fixed_joint(self) -> Joint:
         joint = self.joint
         T = joint.T_parent_joint @ self.motion
         return replace(joint, kind=JointKind.FIXED, T_parent_joint=T, limit=None, mimic=None, lock=self)
@@ -316,12 +318,12 @@ class KinematicTree:
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
-                lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
-                ends[:, at] = min(lower, -LARGEST_ANGLE), max(upper, LARGEST_ANGLE)
-        return frozen(ends)
+                lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
+                ends[:, at] = min(lower, -MAX_PLAUSIBLE_ANGLE), max(upper, MAX_PLAUSIBLE_ANGLE)
+        return freeze(ends)
 
     @cached_property
-    def least_implausible(self) -> float:
+    def min_implausible_angle(self) -> float:
         """Smallest absolute value in `plausible_angles`; infinite if no revolute joint has limits."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
@@ -395,7 +397,11 @@ class KinematicTree:
         return link if link is not None else self._joint_index[name] + 1
 
     def _frame_index(self, frame: FrameName) -> int:
-        return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
+        return (
+            self.link_index(frame.bare_name)
+            if isinstance(frame, LinkFrame)
+            else self.joint_index(frame.bare_name) + 1
+        )
 
     def _with_prefix(self, name: str) -> FrameName | None:
         kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (
@@ -464,7 +470,7 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
     """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [
-        Lock(joint, values[leader]).fixed() if leader in values else joint
+        Lock(joint, values[leader]).make_fixed_joint() if leader in values else joint
         for joint, leader in zip(tree.joints, leaders, strict=True)
     ]
     return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)

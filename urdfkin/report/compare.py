@@ -29,7 +29,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
-from urdfkin.model.summary import axis_words, rule_words
+from urdfkin.model.summary import format_axis, format_mimic_rule
 from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
 from urdfkin.report.words import (
     VERDICTS,
@@ -84,7 +84,7 @@ def _joint_changes(was: ReportedJoint, now: ReportedJoint) -> Iterator[tuple[str
         if dict(was)[entry] != dict(now)[entry]:
             yield aspect, str(dict(was)[entry]), str(dict(now)[entry])
     if was["axis"] != now["axis"]:
-        first, second = (axis_words(axis) if axis else "none" for axis in (was["axis"], now["axis"]))
+        first, second = (format_axis(axis) if axis else "none" for axis in (was["axis"], now["axis"]))
         yield "axis", first, second + _angle_between(was["axis"], now["axis"])
     if was["placement"] != now["placement"]:
         Ts = [np.array(joint["placement"]) for joint in (was, now)]
@@ -111,7 +111,7 @@ def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None
 
 def _rule(joint: ReportedJoint) -> str:
     rule = joint["mimic"]
-    return rule_words(rule["leader"], rule["multiplier"], rule["offset"]) if rule else "none"
+    return format_mimic_rule(rule["leader"], rule["multiplier"], rule["offset"]) if rule else "none"
 
 
 def _names(value: Any) -> str:
@@ -412,7 +412,7 @@ def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[R
         for finding in robot["findings"]:
             if finding["severity"] != "note":
                 key = f"{finding['severity']} {finding['code']}"
-                count[key] = count.get(key, 0) + 1 + len(finding["also"])
+                count[key] = count.get(key, 0) + 1 + len(finding["other_lines"])
     for key in sorted(counts[0].keys() | counts[1].keys()):
         before, after = counts[0].get(key, 0), counts[1].get(key, 0)
         if before != after:

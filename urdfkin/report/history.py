@@ -13,7 +13,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict, cast
 
@@ -22,7 +21,15 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.report.compare import ChangeEntry, ReportChange, compare, find_renamed_files, robots_by_source
 from urdfkin.report.html import format_date, render_template
 from urdfkin.report.reading import check_document, read_stored_document
-from urdfkin.report.words import VERDICTS, bound_ratio_of, format_count, format_ratio, format_units, worst
+from urdfkin.report.words import (
+    VERDICTS,
+    bound_ratio_of,
+    format_count,
+    format_ratio,
+    format_units,
+    utc,
+    worst,
+)
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
 from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
 from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
@@ -238,11 +245,8 @@ def _start(path: Path) -> tuple[float, str]:
     """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
-    try:
-        moment = datetime.fromisoformat(text)
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp(), text
-    except (ValueError, OverflowError):
-        return math.inf, text
+    moment = utc(text)
+    return moment.timestamp() if moment else math.inf, text
 
 
 def _read_report(path: Path) -> Document:
@@ -281,7 +285,7 @@ def _add_robots(history: History, before: Document | None, document: Document) -
 def _point(run: int, source: str, robot: ReportedRobot) -> Point:
     counts = Counter[str]()
     for finding in robot["findings"]:
-        counts[finding["severity"]] += 1 + len(finding["also"])
+        counts[finding["severity"]] += 1 + len(finding["other_lines"])
     return {
         "run": run,
         "source": source,
@@ -395,7 +399,8 @@ def _ratio_cell(one: ValidationRun | Point) -> str:
 
 
 def _date(run: ValidationRun) -> str:
-    return run["started"][:16].replace("T", " ")
+    moment = utc(run["started"])
+    return moment.isoformat(" ", "minutes")[:16] if moment else run["started"][:16].replace("T", " ")
 
 
 def as_html(history: History, command: str | None = None) -> str:

@@ -11,7 +11,6 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator
-from datetime import datetime
 from functools import cache
 from html import escape
 from importlib import resources
@@ -37,6 +36,7 @@ from urdfkin.report.words import (
     second_oracle_title,
     second_reader_words,
     summary,
+    utc,
     verdict_counts,
     worst,
     worst_cell,
@@ -266,12 +266,9 @@ def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
 
 
 def format_date(started: str) -> str:
-    """Format an ISO date; return other texts unchanged."""
-    try:
-        moment = datetime.fromisoformat(started)
-    except ValueError:
-        return started
-    return f"{moment.day} {moment:%B %Y, %H:%M} UTC"
+    """Format an ISO date and time, converted to UTC; return other texts unchanged."""
+    moment = utc(started)
+    return f"{moment.day} {moment:%B %Y, %H:%M} UTC" if moment else started
 
 
 class NotebookView:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
-from urdfkin.model.configuration import range_words
-from urdfkin.model.summary import axis_words
+from urdfkin.model.configuration import format_range
+from urdfkin.model.summary import format_axis
 from urdfkin.report.words import (
     bound_ratio_cell,
     bound_ratio_of,
@@ -104,7 +104,7 @@ def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
             "parent": joint["parent"],
             "child": joint["child"],
             "q": _coordinate(joint),
-            "axis": axis_words(joint["axis"]) if joint["axis"] else "",
+            "axis": format_axis(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
             "remaining_range": _remaining_range(joint),
         }
@@ -120,7 +120,7 @@ def _remaining_range(joint: ReportedJoint) -> str:
         names = ", ".join(remaining["by"])
         return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
-    ends = f"{range_words((remaining['lower'], remaining['upper']))} {unit}"
+    ends = f"{format_range((remaining['lower'], remaining['upper']))} {unit}"
     mimics = ", ".join(remaining["by"])
     return f"{joint['name']}: its mimic joints are within limits only from {ends} ({mimics})."
 

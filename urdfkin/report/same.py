@@ -14,8 +14,8 @@ from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion,
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
-from urdfkin.kinematics.roundings import NOT_ZERO
-from urdfkin.model.configuration import WIDEST, coordinate_names, units
+from urdfkin.kinematics.roundings import MIN_DIVISOR
+from urdfkin.model.configuration import TRAVEL_CONDITION, coordinate_names, units
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
@@ -43,7 +43,7 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in sameness.remarks)
     besides = f"; limits of {format_count(limits, 'joint')} differ" if limits else ""
     if sameness.unlimited:
-        besides += f"; this result holds if joints without limits travel at most {WIDEST:g} m"
+        besides += f"; this result holds if {TRAVEL_CONDITION}"
     if question.within is not None:
         return _within(sameness, question.within) + besides
     off = "the distance of the frames has no bound"
@@ -369,7 +369,7 @@ def as_html(
 
 
 def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Sequence[str]) -> str:
-    words = [robot.origin.words for robot in robots]
+    words = [robot.origin.command_line for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
     words += ["--strict"] if question.strict else []
     return " ".join(["urdfkin same", *words, *map(shlex.quote, options)])
@@ -396,9 +396,9 @@ def pictures(
         i, j = a.tree.link_index(sameness.base_links[0]), b.tree.link_index(sameness.base_links[1])
         T_b = (
             T_a[i]
-            @ inverse(mechanism_a.homes[i])
+            @ inverse(mechanism_a.zero_poses[i])
             @ sameness.base
-            @ mechanism_b.homes[j]
+            @ mechanism_b.zero_poses[j]
             @ inverse(T_b[j])
             @ T_b
         )
@@ -436,7 +436,7 @@ def _draw(
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), NOT_ZERO)
+    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), MIN_DIVISOR)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     ruler = round_length(2.0 * HALF * MAX_SCALE_BAR / scale)
     bar = {

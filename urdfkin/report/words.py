@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
 from typing import Literal
 
 from urdfkin.validation.document import (
@@ -20,6 +21,15 @@ from urdfkin.verify.quantities import QUANTITIES
 
 #: Verdicts, the worst first.
 VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
+
+
+def utc(started: str) -> datetime | None:
+    """Return an ISO date and time in UTC, or None for other texts; a time without an offset is in UTC."""
+    try:
+        moment = datetime.fromisoformat(started)
+        return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
+    except (ValueError, OverflowError):
+        return None
 
 
 def quantity_name(quantity: str) -> str:

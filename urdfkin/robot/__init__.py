@@ -34,21 +34,21 @@ from urdfkin.errors.validators import (
     whole_number,
 )
 from urdfkin.export import QUANTITIES as EXPORTED
-from urdfkin.kinematics.inputs import scalars, vectors
+from urdfkin.kinematics.inputs import as_finite, as_vectors
 from urdfkin.kinematics.rotation import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import sample
-from urdfkin.model.configuration_like import Given, listed
+from urdfkin.model.configuration_like import ConfigurationLike, join_names
 from urdfkin.model.reference import Reference
-from urdfkin.model.summary import Joints, described
+from urdfkin.model.summary import JointTable, summarize
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
-from urdfkin.urdf.sources import Origin, entry_of
+from urdfkin.urdf.sources import Origin, find_entry
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
@@ -195,9 +195,9 @@ class Robot(Displayable):
             from urdfkin.system.plain_xml import order_words
 
         order = order_words(self.urdf, self.joint_names)
-        return described(self.tree, self.base_frame, self.tip_frame, order)
+        return summarize(self.tree, self.base_frame, self.tip_frame, order)
 
-    def view(self, q: Given = "ready", *, height: int = 480) -> Any:
+    def view(self, q: ConfigurationLike = "ready", *, height: int = 480) -> Any:
         """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
 
         The view needs no network and no server, and is saved with the notebook. The browser computes the
@@ -214,7 +214,7 @@ class Robot(Displayable):
         >>> arm = urdfkin.load("planar_two_link")
         >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # shown by a notebook
         """
-        q_0 = configuration.checked(self.tree, q, "q")
+        q_0 = configuration.parse_finite(self.tree, q, "q")
         if q_0.ndim != 1:
             raise InputError("q of a view must be one configuration", found=f"shape {q_0.shape}")
         return hook("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
@@ -279,7 +279,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").path.endswith("planar_two_link.urdf")
         True
         """
-        entry = entry_of(self.source)
+        entry = find_entry(self.source)
         path = entry.path if entry is not None else Path(self.source)
         return str(path.resolve()) if not self.source.startswith(("<", "-")) and path.is_file() else None
 
@@ -357,14 +357,14 @@ class Robot(Displayable):
         return configuration.coordinate_names(self.tree)
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
+    def velocity_names(self) -> tuple[str, ...]:
         """A name for each number of `v` and `a`, and for each column of a Jacobian.
 
         >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").rate_names
+        >>> urdfkin.load("planar_two_link").velocity_names
         ('joint_1', 'joint_2')
         """
-        return configuration.rate_names(self.tree)
+        return configuration.velocity_names(self.tree)
 
     @property
     def frame_names(self) -> tuple[str, ...]:
@@ -412,13 +412,13 @@ class Robot(Displayable):
             raise InputError(
                 "no frame is given, and the robot has several tips",
                 where=self.name,
-                found=listed(leaves),
+                found=join_names(leaves),
                 remedy=f"name one, such as robot.tip_frame, {self.tip_frame!r}",
             )
         return self.tip_frame
 
     @property
-    def joints(self) -> Joints:
+    def joints(self) -> JointTable:
         """All joints by name, fixed joints included, in Pinocchio's order: kind, axis, limit, mimic rule.
 
         The result is a dict of `Joint`; `print` and notebooks show it as a table.
@@ -428,7 +428,7 @@ class Robot(Displayable):
         >>> joint.axis.tolist(), joint.limit.lower, joint.limit.upper
         ([0.0, 0.0, 1.0], -3.0, 3.0)
         """
-        return Joints(self.tree)
+        return JointTable(self.tree)
 
     @property
     def frames(self) -> dict[str, str]:
@@ -518,18 +518,18 @@ class Robot(Displayable):
                 remedy="draw several smaller samples, each with another seed",
             ) from None
 
-    def limit_violations(self, q: Given) -> list[str]:
+    def limit_violations(self, q: ConfigurationLike) -> list[str]:
         """Return a line for each joint that exceeds a limit in some configuration of `q` (..., nq).
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # `look=False` prevents a warning of values in degrees, because the returned lines mention degrees.
-        q = configuration.checked(self.tree, q, "q", look=False)
+        # `warn=False` prevents a warning of values in degrees, because the returned lines mention degrees.
+        q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
-    def integrate(self, q: Given, v: Given) -> FloatArray:
+    def integrate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
         """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.
 
         The definition is that of Pinocchio's `integrate`. For another duration, pass `v * seconds`. The norm
@@ -552,10 +552,12 @@ class Robot(Displayable):
         [0.0, 0.6366, 0.0, 0.0, 0.0, 1.0, 0.0]
         """
         return integration.integrate(
-            self.tree, configuration.checked(self.tree, q, "q"), configuration.checked(self.tree, v, "v")
+            self.tree,
+            configuration.parse_finite(self.tree, q, "q"),
+            configuration.parse_finite(self.tree, v, "v"),
         )
 
-    def difference(self, start: Given, end: Given) -> FloatArray:
+    def difference(self, start: ConfigurationLike, end: ConfigurationLike) -> FloatArray:
         """Return the joint velocities (..., nv) that lead from `start` to `end` in one second.
 
         The result is the shortest motion, as in Pinocchio's `difference`. `integrate(start, difference(start,
@@ -576,10 +578,10 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").difference([0.5, 0.0], [1.5, -1.0]).tolist()
         [1.0, -1.0]
         """
-        ends = (configuration.checked(self.tree, q, "q") for q in (start, end))
+        ends = (configuration.parse_finite(self.tree, q, "q") for q in (start, end))
         return integration.difference(self.tree, *ends)
 
-    def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
+    def to_pinocchio(self, q: ConfigurationLike, *, mimic: bool = False) -> FloatArray:
         """Convert `q` (..., nq) to a configuration of the Pinocchio model that `pinocchio_model` returns.
 
         Pinocchio stores a continuous joint as (cos q, sin q). If `mimic` is False, Pinocchio stores a
@@ -600,7 +602,7 @@ class Robot(Displayable):
         [0.5, -1.0]
         """
         return configuration.to_pinocchio(
-            self.tree, configuration.checked(self.tree, q, "q"), mimic=as_bool(mimic, "mimic")
+            self.tree, configuration.parse_finite(self.tree, q, "q"), mimic=as_bool(mimic, "mimic")
         )
 
     def pinocchio_model(self, *, mimic: bool = False) -> Any:
@@ -646,7 +648,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").from_pinocchio([0.5, -1.0]).tolist()
         [0.5, -1.0]
         """
-        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
+        return configuration.from_pinocchio(self.tree, as_finite(q, "q"), mimic=as_bool(mimic, "mimic"))
 
     def convention(self, name: str | Path | Convention, joints: Sequence[str] | None = None) -> Conversion:
         """Return the conversion of q, v, a, Jacobians and six-vectors to a program's convention, and back.
@@ -715,13 +717,13 @@ class Robot(Displayable):
         >>> panda.nq, panda.jacobian("ready", "panda_hand_tcp").shape
         (7, (6, 7))
         >>> elbow = urdfkin.load("planar_two_link").locked(joints=["joint_2"])
-        >>> elbow.rate_names, elbow.joints["joint_1"].lock.value
+        >>> elbow.velocity_names, elbow.joints["joint_1"].lock.value
         (('joint_2',), 0.0)
         """
         if not isinstance(lock, str | Mapping):
             raise InputError("lock must be a mapping from joints to values, or text", found=safe_repr(lock))
         chosen = None if joints is None else as_names(joints, "joints")
-        locked = configuration.locked_values(self.tree, lock, chosen)
+        locked = configuration.parse_locks(self.tree, lock, chosen)
         robot = copy(self)
         robot.tree = with_locks(self.tree, locked)
         robot.verifier = self.verifier.locked(robot.tree, tuple(locked.items()))
@@ -733,7 +735,7 @@ class Robot(Displayable):
     def compute(
         self,
         name: str,
-        inputs: Sequence[Given],
+        inputs: Sequence[ConfigurationLike],
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -767,7 +769,7 @@ class Robot(Displayable):
 
     def placement(
         self,
-        q: Given,
+        q: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         *,
         base: BaseMotion | None = None,
@@ -815,7 +817,7 @@ class Robot(Displayable):
         [0.4, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.kinematics.bodies import seen_from
+            from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
         # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
@@ -824,15 +826,15 @@ class Robot(Displayable):
         to = call.flat(out, (4, 4))
         self.verifier.require_pinocchio(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
-        T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
+        T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
         result = call.in_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result
 
     def velocity(
         self,
-        q: Given,
-        v: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -855,7 +857,7 @@ class Robot(Displayable):
 
     def jacobian(
         self,
-        q: Given,
+        q: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -866,8 +868,8 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v.
 
-        Column i is the frame's velocity [linear; angular] when the joint velocity `rate_names[i]` is 1 and
-        all others are 0. Units: m/s and rad/s per rad/s or m/s.
+        Column i is the frame's velocity [linear; angular] when the joint velocity `velocity_names[i]` is 1
+        and all others are 0. Units: m/s and rad/s per rad/s or m/s.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -882,8 +884,8 @@ class Robot(Displayable):
 
     def jacobian_rate(
         self,
-        q: Given,
-        v: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -909,7 +911,7 @@ class Robot(Displayable):
 
     def hessian(
         self,
-        q: Given,
+        q: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -953,9 +955,9 @@ class Robot(Displayable):
 
     def acceleration(
         self,
-        q: Given,
-        v: Given,
-        a: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -985,9 +987,9 @@ class Robot(Displayable):
 
     def imu(
         self,
-        q: Given,
-        v: Given,
-        a: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         *,
         gravity: ArrayLike = GRAVITY,
@@ -1014,7 +1016,7 @@ class Robot(Displayable):
         >>> arm.imu([0.0, 0.0], [0.0, 0.0], [0.0, 0.0], "tip").tolist()  # at rest
         [0.0, 0.0, 9.81, 0.0, 0.0, 0.0]
         """
-        g = vectors(gravity, "gravity")
+        g = as_vectors(gravity, "gravity")
         if g.shape != (3,):
             raise InputError("gravity must be one vector (3,)", found=f"shape {g.shape}")
         return self._computed(
@@ -1023,7 +1025,7 @@ class Robot(Displayable):
 
     def singular_values(
         self,
-        q: Given,
+        q: ConfigurationLike,
         frame: str | None = None,
         rows: str = "all",
         *,
@@ -1070,7 +1072,7 @@ class Robot(Displayable):
             J,
             error,
             str(frame),
-            self.rate_names,
+            self.velocity_names,
             axis_kinds(self.tree),
             active,
             partial(self._sampled, frame),
@@ -1080,7 +1082,7 @@ class Robot(Displayable):
 
     def analytical_jacobian(
         self,
-        q: Given,
+        q: ConfigurationLike,
         frame: str | Sequence[str] | None = None,
         representation: str = "ZYZ",
         *,
@@ -1157,9 +1159,9 @@ class Robot(Displayable):
 
     def acceleration_breakdown(
         self,
-        q: Given,
-        v: Given,
-        a: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
         frame: str | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -1208,9 +1210,9 @@ class Robot(Displayable):
 
     def enclose(
         self,
-        q: Given,
-        v: Given,
-        a: Given,
+        q: ConfigurationLike,
+        v: ConfigurationLike,
+        a: ConfigurationLike,
         frame: str | None = None,
         reference: Reference | str = _ALIGNED,
         *,
@@ -1422,11 +1424,11 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").chain("tip", "base")
         <FrameChain planar_two_link: base to tip, 2 joints>
         """
-        return chain(
+        return make_chain(
             self.tree, as_choice(tip, self.tip_frame, "tip"), as_choice(base, self.base_frame, "base")
         )
 
-    def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
+    def select(self, path: FrameChain | DHTable, q: ConfigurationLike) -> FloatArray:
         """Return the n coordinates (..., n) of a chain or table, selected from the robot's `q` (..., nq).
 
         Args:
@@ -1607,7 +1609,7 @@ class Robot(Displayable):
     def _computed(
         self,
         name: str,
-        inputs: Sequence[Given],
+        inputs: Sequence[ConfigurationLike],
         frame: str | Sequence[str] | None,
         reference: Reference | str,
         base: BaseMotion | None,

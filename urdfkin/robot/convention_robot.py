@@ -62,9 +62,9 @@ class ConventionRobot:
         return self.conversion.coordinate_names
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
+    def velocity_names(self) -> tuple[str, ...]:
         """Names of the numbers of v and a in the target program."""
-        return self.conversion.rate_names
+        return self.conversion.velocity_names
 
     def neutral(self) -> FloatArray:
         """Return the zero configuration of the URDF, converted to the target program's q."""
@@ -91,13 +91,17 @@ class ConventionRobot:
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
         """Return a frame's velocity (..., 6) with the target program's row order; see `Robot.velocity`."""
-        return self.conversion.six(self._call(self.robot.velocity, (q, v), frame, *more, **options)[1])
+        return self.conversion.reorder_six_vector(
+            self._call(self.robot.velocity, (q, v), frame, *more, **options)[1]
+        )
 
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
         """Return the target program's classical acceleration (..., 6); see `Robot.acceleration`."""
-        return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
+        return self.conversion.reorder_six_vector(
+            self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1]
+        )
 
     def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
         """Return the target program's Jacobian (..., 6, nv) of a frame; see `Robot.jacobian`."""
@@ -131,7 +135,7 @@ class ConventionRobot:
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
         """Call a method of `Robot`; return the inputs in urdfkin's convention, and the result."""
         read: list[ArrayLike] = [
-            self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
+            self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)
         ]
         found = self.conversion.from_(*read)

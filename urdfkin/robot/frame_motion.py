@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from urdfkin.compiled.breakdown import AccelerationBreakdown, acceleration_breakdown
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -142,7 +142,7 @@ class FrameMotion:
 
 def frame_motion(
     robot: Robot,
-    motion: Trajectory | Sequence[Given],
+    motion: Trajectory | Sequence[ConfigurationLike],
     frame: str,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FrameMotion:

@@ -18,12 +18,21 @@ from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
-from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, tilts
-from urdfkin.urdf.lint.rules.left_out import of_mjcf
+from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, find_axis_tilts
+from urdfkin.urdf.lint.rules.left_out import make_mjcf_findings
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, is_usd, read_source
+from urdfkin.urdf.sources import (
+    Origin,
+    Source,
+    UrdfText,
+    find_entry,
+    is_urdf_path,
+    is_usd,
+    read_source,
+    unambiguous_path,
+)
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library
 from urdfkin.verify.verifier import Verify, as_verify
@@ -128,28 +137,28 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         return _load_usd(source, xacro_args, variant, articulation, **how)
     if variant or articulation is not None:
         raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
-    if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
+    if is_urdf_path(source) or (isinstance(source, str) and find_entry(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
     from urdfkin.dh.parse_table import is_table_file
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
-    from urdfkin.urdf.catalogue import described
-    from urdfkin.urdf.foreign import is_model, lost_quaternions, text_of
+    from urdfkin.urdf.catalogue import find_description
+    from urdfkin.urdf.foreign import convert_to_urdf, find_lost_quaternions, is_pinocchio_model
     from urdfkin.urdf.mjcf import is_mjcf
 
-    if (found := described(source)) is not None:
+    if (found := find_description(source)) is not None:
         source = found.path
         xacro_args = {**found.xacro_args, **(xacro_args or {})}
     if isinstance(source, DHTable | ProductOfExponentials) or is_table_file(source):
         return _load_table(source, xacro_args, **how)
     if is_mjcf(source):
         return _load_mjcf(source, xacro_args, None, **how)
-    if is_model(source):
+    if is_pinocchio_model(source):
         return _load_model(source, xacro_args, **how)
-    if (written := text_of(source)) is not None:
+    if (written := convert_to_urdf(source)) is not None:
         _refuse_arguments(xacro_args, written[1])
-        lost = lost_quaternions(source, written[1])
-        robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
+        lost = find_lost_quaternions(source, written[1])
+        robot = robot_of(UrdfText(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
             robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
         return robot
@@ -158,6 +167,11 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     return (
         _load_mjcf(text.data, None, text, **how) if streamed and is_mjcf(text.data) else robot_of(text, **how)
     )
+
+
+def as_robot(source: Robot | Source | DHTable) -> Robot:
+    """Return a robot unchanged; load any other source."""
+    return source if isinstance(source, Robot) else load(source)
 
 
 def _load_table(
@@ -178,14 +192,14 @@ def _load_table(
         table, name = source, "<table>"
     else:
         path = at_home(source)
-        table, name = read_table_or_screws(path), as_word(path)
+        table, name = read_table_or_screws(path), unambiguous_path(path)
     if isinstance(table, ProductOfExponentials):
         urdf = write_urdf(table.to_tree())
     else:
         urdf = to_urdf(table)
         for warning in table_warnings(table):
             warnings.warn(f"{name}: {warning}", UrdfWarning, stacklevel=3)
-    text = Text(urdf.encode(), name, name)
+    text = UrdfText(urdf.encode(), name, name)
     robot = robot_of(text, **how, made=True, table=True)
     if as_verify(how["verify"]):
         verifier = _plain(robot, text).verifier
@@ -199,12 +213,12 @@ def _load_table(
 def _load_mjcf(
     source: str | bytes | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
-    streamed: Text | None,
+    streamed: UrdfText | None,
     **how: Unpack[LoadOptions],
 ) -> Robot:
     import hashlib
 
-    from urdfkin.urdf.mjcf import name_of
+    from urdfkin.urdf.mjcf import source_name
     from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
 
     _refuse_arguments(xacro_args, "MJCF")
@@ -212,9 +226,15 @@ def _load_mjcf(
     data = _bytes_of_mjcf(source)
     digest = hashlib.sha256(data).hexdigest()
     read = read_mjcf(source, check=wanted)
-    name = as_word(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
-    text = Text(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
-    listed = of_mjcf(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
+    name = (
+        unambiguous_path(Path(read.path))
+        if read.path
+        else streamed.source
+        if streamed
+        else source_name(source)
+    )
+    text = UrdfText(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
+    listed = make_mjcf_findings(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
         verifier = _plain(robot, text, listed=listed, made=True).verifier
@@ -231,7 +251,7 @@ def _load_usd(
 ) -> Robot:
     import hashlib
 
-    from urdfkin.urdf.lint.rules.left_out import of_usd
+    from urdfkin.urdf.lint.rules.left_out import make_usd_findings
     from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision
 
     _refuse_arguments(xacro_args, "USD")
@@ -242,8 +262,8 @@ def _load_usd(
     read = read_usd(source, variants=variants, articulation=articulation)
     data = read_bytes(Path(read.path))
     digest = hashlib.sha256(data).hexdigest()
-    name = as_word(Path(read.path))
-    text = Text(
+    name = unambiguous_path(Path(read.path))
+    text = UrdfText(
         read.urdf.encode(),
         f"{name} (as a URDF)",
         name,
@@ -253,7 +273,7 @@ def _load_usd(
     )
     verifier = robot_of(text, verify=False, made=True, quiet=True).verifier
     line, remarks = check_usd_source(verifier, read)
-    listed = of_usd((*read.remarks, *remarks), name, data)
+    listed = make_usd_findings((*read.remarks, *remarks), name, data)
     robot = robot_of(text, **how, listed=listed, made=True)
     robot.single = single_precision(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]
@@ -262,7 +282,7 @@ def _load_usd(
     return robot
 
 
-def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
+def _plain(robot: Robot, text: UrdfText, **options: Any) -> Robot:
     """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
@@ -280,12 +300,12 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
-    from urdfkin.urdf.foreign import tree_of_model
+    from urdfkin.urdf.foreign import convert_pinocchio_model
     from urdfkin.verify.conversions import check_model_source
 
     _refuse_arguments(xacro_args, "a pinocchio.Model")
-    read = tree_of_model(source)
-    text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
+    read = convert_pinocchio_model(source)
+    text = UrdfText(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
     robot = robot_of(text, **how, made=True)
     if as_verify(how["verify"]):
         verifier = _plain(robot, text, made=True).verifier
@@ -299,7 +319,7 @@ def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> No
 
 
 def robot_of(
-    text: Text,
+    text: UrdfText,
     *,
     verify: Verify = True,
     mimic: bool | None = None,
@@ -336,14 +356,14 @@ def robot_of(
     report = Reporter(text.label, text.data)
     urdf = read_urdf(report, mimic=mimic, root_joint=root_joint)
     findings = (*listed, *report.findings())
-    if urdf is None or report.failed:
+    if urdf is None or report.has_errors:
         raise UrdfError(findings)
     if text.entry is None and not quiet:
         for finding in findings:
             if finding.severity is Severity.WARNING and not (made and finding.code in _OF_A_TEXT):
                 warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)
     tree = read_tree(urdf, mimic=mimic, root_joint=root_joint)
-    if tilted := tilts(urdf):
+    if tilted := find_axis_tilts(urdf):
         tree = with_tilts(tree, tilted)
     if text.entry is not None and text.entry.poses:
         tree = with_poses(tree, text.entry.poses)
@@ -354,7 +374,7 @@ def robot_of(
         verify=verify,
         mimic=mimic,
         findings=findings,
-        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced))),
+        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced_findings))),
         oracle=oracle,
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,
@@ -370,6 +390,7 @@ def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",
     }
     for finding in findings:
-        if finding.oracle in problems:
-            return f"{problems[finding.oracle]} ({finding.code}, line {finding.line}: {finding.message})"
+        if finding.pinocchio_reading in problems:
+            place = f"{finding.code}, line {finding.line}"
+            return f"{problems[finding.pinocchio_reading]} ({place}: {finding.message})"
     return None

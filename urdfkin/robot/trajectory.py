@@ -35,13 +35,13 @@ import numpy as np
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import real_number, whole_number
-from urdfkin.kinematics.inputs import FloatArray, scalars
-from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
+from urdfkin.kinematics.inputs import FloatArray, as_finite
+from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_from_quaternion
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked, coordinate_layout
-from urdfkin.model.configuration_like import Given, listed, wrong_count
+from urdfkin.model.configuration import coordinate_layout, parse_finite
+from urdfkin.model.configuration_like import ConfigurationLike, join_names, wrong_count_error
 from urdfkin.model.integration import difference, integrate
-from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, freeze
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
             found=str(error),
             remedy="write it with numpy.savez",
         ) from error
-    arrays = {name: scalars(array, f"{path}: {name}") for name, array in given.items()}
+    arrays = {name: as_finite(array, f"{path}: {name}") for name, array in given.items()}
     n = len(arrays[required[0]]) if arrays[required[0]].ndim else 0
     for name, array in arrays.items():
         if array.shape != (n, *shapes[name]):
@@ -184,7 +184,9 @@ class Trajectory:
         )
 
 
-def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
+def line(
+    robot: Robot, start: ConfigurationLike, end: ConfigurationLike, duration: float, samples: int
+) -> Trajectory:
     """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
 
     A planar or floating joint moves along one screw axis, with a rotation of at most half a turn. A
@@ -198,7 +200,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
             f"a line needs a duration above 0 and at least {_FEWEST} samples",
             found=f"{duration} s, {samples}",
         )
-    q_0, q_1 = checked(robot.tree, start, "q"), checked(robot.tree, end, "q")
+    q_0, q_1 = parse_finite(robot.tree, start, "q"), parse_finite(robot.tree, end, "q")
     t = np.linspace(0.0, duration, samples)
     u = (t / duration)[:, np.newaxis]
     s = u**3 * (10.0 + u * (-15.0 + 6.0 * u))
@@ -212,7 +214,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     # This is true for planar and floating joints too: `step` contains their twist in the moving frame, and
     # this twist is constant.
     q = integrate(robot.tree, q_0, s * step)
-    return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
+    return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
 
 def read_trajectory(
@@ -271,8 +273,8 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
         raise InputError("time must increase", where=str(path), found=found)
     q = data["q"]
     if conversion is None:
-        q = checked(robot.tree, q, "q")
-        v, a = (x if x is None else checked(robot.tree, x, name) for name, x in (("v", v), ("a", a)))
+        q = parse_finite(robot.tree, q, "q")
+        v, a = (x if x is None else parse_finite(robot.tree, x, name) for name, x in (("v", v), ("a", a)))
     elif v is None:
         q = conversion.from_(q)
     elif a is None:
@@ -282,8 +284,8 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
     if not len(q):
         raise InputError("no samples", where=str(path), remedy="write one line for each sample")
     base = BaseMotion(*(data[name] for name in _BASE)) if _BASE[0] in data else None
-    t, v, a = (x if x is None else frozen(x) for x in (t, v, a))
-    return TrajectorySamples(str(path), frozen(q), t, v, a, base)
+    t, v, a = (x if x is None else freeze(x) for x in (t, v, a))
+    return TrajectorySamples(str(path), freeze(q), t, v, a, base)
 
 
 def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
@@ -293,7 +295,7 @@ def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
         raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=x.where, found=str(n))
     t = np.arange(n, dtype=np.float64) if x.t is None else x.t
     if x.v is not None and x.a is not None:
-        return Trajectory(frozen(t), x.q, x.v, x.a, "as given", base=x.base)
+        return Trajectory(freeze(t), x.q, x.v, x.a, "as given", base=x.base)
     found = Unwrapped(x.q, (), ()) if x.v is not None else unwrapped(tree, x.q)
     v, a = _differences(tree, found.q, t, x.v)
     errors = None
@@ -307,7 +309,7 @@ def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
     notes = (*found.notes, *_time_notes(t, given=x.t is not None))
-    rows = frozen(t), frozen(found.q), frozen(v), frozen(a)
+    rows = freeze(t), freeze(found.q), freeze(v), freeze(a)
     return Trajectory(*rows, words, notes=notes, base=x.base, errors=errors)
 
 
@@ -394,7 +396,7 @@ def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
             v[:, to + 2] = slopes[:, at + 2]
         elif joint.kind is JointKind.FLOATING:
             quaternion, rates = (x[:, at + 3 : at + 7] for x in (q, slopes))
-            R = rotation_of(quaternion)
+            R = rotation_from_quaternion(quaternion)
             v[:, to : to + 3] = (R.swapaxes(-1, -2) @ slopes[:, at : at + 3, np.newaxis])[..., 0]
             v[:, to + 3 : to + 6] = angular_velocity_from_quaternion_rates(quaternion, rates, "body")
         elif joint.nv:
@@ -446,7 +448,7 @@ def read_columns(
                 f"no header: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
                 found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
-                remedy=f"add a first line with the column names: {listed([*optional[:1], *required])}",
+                remedy=f"add a first line with the column names: {join_names([*optional[:1], *required])}",
             )
         _check_columns(names, cells, f"{where}:{line}", what, required, optional)
     elif first is not None:
@@ -534,7 +536,7 @@ def width_of(text: str, where: str) -> int:
 def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
     """Parse one number for each name."""
     if len(cells) != len(names):
-        raise wrong_count(names, len(cells), where)
+        raise wrong_count_error(names, len(cells), where)
     values = []
     for name, cell in zip(names, cells, strict=True):
         if (value := parse_float(cell)) is None:
@@ -576,12 +578,12 @@ def _check_columns(
         "duplicate": sorted({h for name, h in zip(names, headings, strict=True) if given[name] > 1}),
     }
     if any(wrong.values()):
-        also = f", and optionally {listed(optional)}" if optional else ""
+        also = f", and optionally {join_names(optional)}" if optional else ""
         raise InputError(
             f"the first line must name the columns of {what}",
             where=where,
-            found="; ".join(f"{word}: {listed(found)}" for word, found in wrong.items() if found),
-            remedy=f"name the columns {listed(required)}{also}",
+            found="; ".join(f"{word}: {join_names(found)}" for word, found in wrong.items() if found),
+            remedy=f"name the columns {join_names(required)}{also}",
         )
 
 

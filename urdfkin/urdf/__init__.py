@@ -2,7 +2,7 @@
 
 | Step | Module | Result |
 |---|---|---|
-| Source | `sources`, `catalogue`, `xacro` | `Text`: the bytes of a URDF and the name of the source |
+| Source | `sources`, `catalogue`, `xacro` | `UrdfText`: the bytes of a URDF and the name of the source |
 | Parser | `parser` | `RobotRecord` (in `records`), and a `Finding` (in `findings`) for each problem |
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |

@@ -9,7 +9,8 @@ The folder of a package `name` is the first of these folders that exists:
 1. For each folder `src` in `ROS_PACKAGE_PATH`: first the folder `src`, but only if it is called `name`.
    Then `src/name`, and then each `src/*/name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above the file `beside`: first the folder itself, but only if it is called `name`, or if
+3. For each folder above `referring_file`: first the folder itself, but only if it is called `name`,
+or if
    its `package.xml` contains this name. Then the subfolder `name`.
 """
 
@@ -33,16 +34,16 @@ from urdfkin.system.resources import example_robots_dir, robots_dir
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CatalogueEntry:
     """A robot of the catalogue.
 
     Attributes:
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
-        reason: Why the mimic rules of the URDF are invalid, or None.
+        mimic_problem: Why the mimic rules of the URDF are invalid, or None.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
-        own: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
+        is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
 
     name: str
@@ -50,13 +51,13 @@ class Entry:
     relative_path: Path
     limbs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     mimic: bool = True
-    reason: str | None = None
+    mimic_problem: str | None = None
     poses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    own: bool = False
+    is_bundled: bool = False
 
     @property
     def path(self) -> Path:
-        return (robots_dir() if self.own else example_robots_dir()) / self.relative_path
+        return (robots_dir() if self.is_bundled else example_robots_dir()) / self.relative_path
 
     @property
     def base(self) -> str | None:
@@ -68,8 +69,11 @@ class Entry:
 
 
 @cache
-def catalogue() -> Mapping[str, Entry]:
-    return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
+def catalogue() -> Mapping[str, CatalogueEntry]:
+    return {
+        **_read_catalogue("catalogue.toml", is_bundled=False),
+        **_read_catalogue("own.toml", is_bundled=True),
+    }
 
 
 def robots(family: str | None = None) -> tuple[str, ...]:
@@ -91,11 +95,11 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     return tuple(name for name, entry in catalogue().items() if family in (None, entry.family))
 
 
-def examples() -> tuple[str, ...]:
-    return tuple(name for name, entry in catalogue().items() if not entry.own)
+def example_robots() -> tuple[str, ...]:
+    return tuple(name for name, entry in catalogue().items() if not entry.is_bundled)
 
 
-def _read(file: str, *, own: bool) -> dict[str, Entry]:
+def _read_catalogue(file: str, *, is_bundled: bool) -> dict[str, CatalogueEntry]:
     path = robots_dir() / file
     if not path.is_file():
         return {}
@@ -107,22 +111,24 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
     for name, row in table.items():
         limbs = {limb: (base, tip) for limb, (base, tip) in row.pop("limbs", {}).items()}
         place = Path(row.pop("path"))
-        entries[name] = Entry(name=name, relative_path=place, limbs=limbs, own=own, **row)
+        entries[name] = CatalogueEntry(
+            name=name, relative_path=place, limbs=limbs, is_bundled=is_bundled, **row
+        )
     return entries
 
 
 #: Environment variables with search paths for packages.
-VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+PACKAGE_PATH_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
-_NAME = re.compile(rb"<name>([^<]*)</name>")
+_PACKAGE_NAME = re.compile(rb"<name>([^<]*)</name>")
 
 #: Schemes of addresses that consist of a package name and a path in the package.
-SCHEMES = ("package://", "model://")
+PACKAGE_SCHEMES = ("package://", "model://")
 
 
 def split_uri(uri: str) -> tuple[str, str] | None:
     """Return package and path of a `package://` or `model://` address; None for other text."""
-    for scheme in SCHEMES:
+    for scheme in PACKAGE_SCHEMES:
         if uri.startswith(scheme):
             package, _, path = uri.removeprefix(scheme).partition("/")
             return package, path
@@ -131,27 +137,27 @@ def split_uri(uri: str) -> tuple[str, str] | None:
 
 def find_package(
     name: str,
-    beside: Path | None = None,
+    referring_file: Path | None = None,
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
     """Return the folder of a package, or None; the docstring of this module describes the search."""
     if not name or name in (".", "..") or "\0" in name:
         return None
-    found = filter(is_folder, _candidates(name, beside, environ))
+    found = filter(is_folder, _candidates(name, referring_file, environ))
     return next(filter(accepts, found), None)
 
 
-def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> Iterator[Path]:
+def _candidates(name: str, referring_file: Path | None, environ: Mapping[str, str]) -> Iterator[Path]:
     for entry in search_path("ROS_PACKAGE_PATH", environ):
         if entry.name == name:
             yield entry
         yield entry / name
-        yield from (folder / name for folder in _folders(entry))
+        yield from (folder / name for folder in _subfolders(entry))
     for entry in search_path("AMENT_PREFIX_PATH", environ):
         yield entry / "share" / name
-    if beside is not None:
-        for folder in beside.absolute().parents:
+    if referring_file is not None:
+        for folder in referring_file.absolute().parents:
             if folder.name == name or _declares(folder / "package.xml", name):
                 yield folder
             yield folder / name
@@ -159,7 +165,7 @@ def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> I
 
 def _declares(manifest: Path, name: str) -> bool:
     try:
-        match = _NAME.search(read_start(manifest, 100_000))
+        match = _PACKAGE_NAME.search(read_start(manifest, 100_000))
     except OSError:
         return False
     return match is not None and match[1].decode("utf-8", "replace").strip() == name
@@ -169,42 +175,42 @@ def search_path(variable: str, environ: Mapping[str, str] = os.environ) -> list[
     return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry]
 
 
-def _folders(entry: Path) -> list[Path]:
+def _subfolders(entry: Path) -> list[Path]:
     try:
         return sorted(child for child in entry.iterdir() if child.is_dir())
     except OSError:
         return []
 
 
-_PACKAGE = "robot_descriptions"
+_DESCRIPTIONS_PACKAGE = "robot_descriptions"
 _DESCRIPTION_NAME = re.compile(r"\w+_description")
 
 
 @dataclass(frozen=True, slots=True)
-class Described:
+class ResolvedDescription:
     path: Path
     xacro_args: Mapping[str, object] = field(default_factory=dict)
 
 
-def described(source: object) -> Described | None:
+def find_description(source: object) -> ResolvedDescription | None:
     """Return the file of a robot in robot_descriptions, or None for any other source."""
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or exists(Path(source)):
             return None
-        source = _description(source)
-    return _file(source) if isinstance(source, ModuleType) else None
+        source = _import_description(source)
+    return _find_description_file(source) if isinstance(source, ModuleType) else None
 
 
-def _description(name: str) -> ModuleType:
-    if importlib.util.find_spec(_PACKAGE) is None:
-        remedy = f"pip install {_PACKAGE}, or name a file"
-        raise InputError(f"{_PACKAGE} is not installed", where=name, remedy=remedy)
+def _import_description(name: str) -> ModuleType:
+    if importlib.util.find_spec(_DESCRIPTIONS_PACKAGE) is None:
+        remedy = f"pip install {_DESCRIPTIONS_PACKAGE}, or name a file"
+        raise InputError(f"{_DESCRIPTIONS_PACKAGE} is not installed", where=name, remedy=remedy)
     from robot_descriptions import DESCRIPTIONS
 
     if name not in DESCRIPTIONS:
         raise UnknownNameError("robot description", name, DESCRIPTIONS)
     try:
-        return importlib.import_module(f"{_PACKAGE}.{name}")
+        return importlib.import_module(f"{_DESCRIPTIONS_PACKAGE}.{name}")
     except Exception as error:  # The download raises errors of many classes.
         message = str(error).strip().splitlines() or [type(error).__name__]
         raise SourceError(
@@ -215,10 +221,12 @@ def _description(name: str) -> ModuleType:
         ) from error
 
 
-def _file(module: Any) -> Described:
+def _find_description_file(module: Any) -> ResolvedDescription:
     for name in ("URDF_PATH", "XACRO_PATH", "MJCF_PATH"):
         if hasattr(module, name):
             arguments = getattr(module, "XACRO_ARGS", {}) if name == "XACRO_PATH" else {}
-            return Described(Path(getattr(module, name)), dict(arguments))
+            return ResolvedDescription(Path(getattr(module, name)), dict(arguments))
     message = "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"
-    raise InputError(message, where=module.__name__, remedy=f"pass a description module of {_PACKAGE}")
+    raise InputError(
+        message, where=module.__name__, remedy=f"pass a description module of {_DESCRIPTIONS_PACKAGE}"
+    )

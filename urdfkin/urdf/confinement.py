@@ -21,62 +21,69 @@ from typing import Any
 from urdfkin.urdf.expressions import RefusedError
 
 #: Maximum memory of the process in bytes. Python and its imported libraries need about a tenth of this.
-MEMORY = 2 * 1024**3
+MAX_MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
-_HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
+_HARMLESS_EVENTS = {
+    "builtins.id",
+    "compile",
+    "glob.glob",
+    "glob.glob/2",
+    "object.__getattr__",
+    "sys._getframe",
+}
 #: Audit events that are allowed only for files that the process may read.
-_READING = {"open", "os.listdir", "os.scandir"}
-_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_READ_EVENTS = {"open", "os.listdir", "os.scandir"}
+_WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 @dataclass(slots=True)
-class Ground:
+class AllowedPaths:
     """The files that a confined process may read.
 
     Attributes:
         roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
             The target of a symbolic link must also be one of these files, or be in one of these folders.
-        installed: Folders with installed packages. A symbolic link in these folders may point to a package in
-            any other folder. `colcon build --symlink-install` writes such links.
+        package_folders: Folders with installed packages. A symbolic link in these folders may point to a
+            package in any other folder. `colcon build --symlink-install` writes such links.
         manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
             these files.
     """
 
     roots: list[str] = field(default_factory=list)
-    installed: list[str] = field(default_factory=list)
+    package_folders: list[str] = field(default_factory=list)
     manifests: list[str] = field(default_factory=list)
 
     @classmethod
-    def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
+    def of_file(cls, path: Path, package_paths: list[str], arguments: list[str]) -> AllowedPaths:
         """Allow a file's folder, package and repository, the search paths, and paths in `arguments`."""
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
-        for mark in ("package.xml", ".git"):
-            wide += _nearest_folder_with(mark, path.resolve())
+        for file_name in ("package.xml", ".git"):
+            wide += _nearest_folder_with(file_name, path.resolve())
         home = os.path.expanduser("~")  # noqa: PTH111  Path.home() may fail
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
-        near = [path, path.parent, path.resolve().parent, *map(Path, search)]
+        near = [path, path.parent, path.resolve().parent, *map(Path, package_paths)]
         roots = [*(place.resolve() for place in near), *(place for place in real if place not in everything)]
         manifests = [str(folder / "package.xml") for folder in path.absolute().parents]
-        return cls([str(root) for root in roots], search, manifests)
+        return cls([str(root) for root in roots], package_paths, manifests)
 
-    def holds(self, path: str) -> bool:
+    def allows(self, path: str) -> bool:
         real = os.path.realpath(path)
         as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
         if as_written in self.manifests and os.path.basename(real) == "package.xml":  # noqa: PTH119
             return True
         roots = self.roots
-        if any(_lies_in(root, as_written) for root in self.installed):
+        if any(_is_inside(root, as_written) for root in self.package_folders):
             roots = [*roots, *map(str, _nearest_folder_with("package.xml", Path(real)))]
-        return any(_lies_in(root, real) for root in roots)
+        return any(_is_inside(root, real) for root in roots)
 
 
-def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
-    return [folder for folder in path.parents if _exists(folder / mark)][:1]
+def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
+    return [folder for folder in path.parents if _exists(folder / file_name)][:1]
 
 
-def _lies_in(root: str, path: str) -> bool:
+def _is_inside(root: str, path: str) -> bool:
     """Return whether `path` is `root`, or is below `root` and no part below `root` is hidden."""
     if path == root:
         return True
@@ -91,12 +98,12 @@ def _exists(path: Path) -> bool:
         return False
 
 
-def limit(seconds: int) -> None:
+def limit_process(seconds: int) -> None:
     """Limit memory and CPU time of this process; forbid writing files and starting processes."""
     import resource
 
     bounds = {
-        resource.RLIMIT_AS: MEMORY,
+        resource.RLIMIT_AS: MAX_MEMORY,
         resource.RLIMIT_CPU: seconds,
         resource.RLIMIT_FSIZE: 0,
         resource.RLIMIT_NPROC: 0,
@@ -111,22 +118,23 @@ def limit(seconds: int) -> None:
         resource.setrlimit(kind, (least, least))
 
 
-def confine(holds: Callable[[str], bool]) -> None:
-    """From now on, allow this process to read only the files that `holds` accepts."""
+def confine(is_allowed: Callable[[str], bool]) -> None:
+    """From now on, allow this process to read only the files that `is_allowed` accepts."""
 
-    def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        if event in _HARMLESS:
+    def refuse_forbidden(event: str, arguments: tuple[Any, ...]) -> None:
+        if event in _HARMLESS_EVENTS:
             return
-        if event not in _READING:
+        if event not in _READ_EVENTS:
             raise RefusedError(f"a xacro file may not do this: {event} {arguments!r:.80}")
         path, *how = arguments
-        if event == "open" and how[-1] & _WRITING:
+        if event == "open" and how[-1] & _WRITE_FLAGS:
             raise RefusedError(f"a xacro file may not write a file: {path!r}")
-        if not isinstance(path, str | bytes | os.PathLike) or not holds(os.fsdecode(path)):
+        if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
-                " xacro file's folder, package and repository, and the packages on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH"
+                " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
+                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
+                " package.xml of each folder above the file, and the files and folders that an argument names"
             )
 
-    sys.addaudithook(watch)
+    sys.addaudithook(refuse_forbidden)

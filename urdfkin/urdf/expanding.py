@@ -15,28 +15,28 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.urdf.catalogue import find_package
-from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
+from urdfkin.urdf.confinement import MAX_MEMORY, AllowedPaths, confine, limit_process
 from urdfkin.urdf.expressions import RefusedError, evaluate
-from urdfkin.urdf.xacro import arguments_of
+from urdfkin.urdf.xacro import find_arguments
 
 #: Functions of xacro that would give an expression access to types and attributes.
-_FORBIDDEN = ("type", "vars")
+_FORBIDDEN_SYMBOLS = ("type", "vars")
 
 #: An expression that xacro itself evaluates, but that urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
-_TOO_MUCH = f"the expansion takes more than {MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
     """Read a request from standard input, and write the result as the last line of standard output."""
     request = json.load(sys.stdin)
-    limit(request["seconds"])
+    limit_process(request["seconds"])
     os.environ.clear()
     os.chdir(Path(request["path"]).parent)  # A path in an include may be relative to this folder.
-    ground = Ground(**request["ground"])
+    allowed_paths = AllowedPaths(**request["allowed_paths"])
     try:
-        answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
+        answer = _expand(Path(request["path"]), request["arguments"], request["search"], allowed_paths)
     except MemoryError:
         answer = {"error": _TOO_MUCH}
     except (Exception, SystemExit) as error:
@@ -47,20 +47,20 @@ def serve() -> None:
 
 
 def _expand(
-    path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground
+    path: Path, arguments: dict[str, str], search: Mapping[str, str], allowed_paths: AllowedPaths
 ) -> dict[str, Any]:
     import xacrodoc
 
-    _replace_evaluation(path, search, ground)
+    _replace_evaluation(path, search, allowed_paths)
     importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
-    confine(ground.holds)
+    confine(allowed_paths.allows)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
-    declared = arguments_of(path, _finder(path, search, ground)) if arguments else None
+    declared = find_arguments(path, _make_package_finder(path, search, allowed_paths)) if arguments else None
     return {"urdf": urdf, "arguments": None if declared is None else sorted(declared)}
 
 
-def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
+def _replace_evaluation(path: Path, search: Mapping[str, str], allowed_paths: AllowedPaths) -> None:
     """Make xacro call urdfkin's functions to evaluate expressions and to find packages.
 
     Raise RefusedError if xacro still evaluates expressions itself.
@@ -70,7 +70,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     from xacro import substitution_args
 
     symbols = xacro._global_symbols
-    for name in _FORBIDDEN:
+    for name in _FORBIDDEN_SYMBOLS:
         dict.pop(symbols["python"], name, None)
     namespaces = [dict(symbols), *(value for value in symbols.values() if isinstance(value, dict))]
     functions = [value for names in namespaces for value in dict.values(names) if callable(value)]
@@ -89,7 +89,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
     xacro.safe_eval = value_of
     substitution_args._eval = value_of_arguments  # This function evaluates `$(eval ...)`.
-    xacrodoc.packages.get_path = _finder(path, search, ground)
+    xacrodoc.packages.get_path = _make_package_finder(path, search, allowed_paths)
     try:
         xacro.eval_text(_PROBE, symbols)
     except xacro.XacroException as error:
@@ -98,20 +98,22 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     raise RefusedError("this version of xacro evaluates expressions in an unknown way and is not supported")
 
 
-def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
+def _make_package_finder(
+    path: Path, search: Mapping[str, str], allowed_paths: AllowedPaths
+) -> Callable[[str], str]:
     def is_package(folder: Path) -> bool:
         """Return whether a folder is allowed or contains a package.xml.
 
         For example, `$(find etc)` does not find /etc.
         """
-        return ground.holds(str(folder)) or (folder / "package.xml").is_file()
+        return allowed_paths.allows(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:
         folder = find_package(name, path, search, is_package)
         if folder is None:
             raise LookupError(f"package {name!r} is not found")
-        if not ground.holds(str(folder)):
-            ground.roots.append(str(folder.resolve()))
+        if not allowed_paths.allows(str(folder)):
+            allowed_paths.roots.append(str(folder.resolve()))
         return str(folder)
 
     return get_path

@@ -137,10 +137,10 @@ class _Evaluation:
                 yield self.value(node)
 
     def BinOp(self, node: ast.BinOp) -> Any:
-        return _rule(_BINARY, node, node.op)(self.value(node.left), self.value(node.right))
+        return _find_operation(_BINARY, node, node.op)(self.value(node.left), self.value(node.right))
 
     def UnaryOp(self, node: ast.UnaryOp) -> Any:
-        return _rule(_UNARY, node, node.op)(self.value(node.operand))
+        return _find_operation(_UNARY, node, node.op)(self.value(node.operand))
 
     def BoolOp(self, node: ast.BoolOp) -> Any:
         decisive = isinstance(node.op, ast.Or)
@@ -153,7 +153,7 @@ class _Evaluation:
         left, result = self.value(node.left), True
         for op, part in zip(node.ops, node.comparators, strict=True):
             right = self.value(part)
-            if not (result := _rule(_COMPARE, node, op)(left, right)):
+            if not (result := _find_operation(_COMPARE, node, op)(left, right)):
                 break
             left = right
         return result
@@ -174,24 +174,26 @@ class _Evaluation:
         loop, *others = loops
         for value in self.value(loop.iter):
             # Copying `self._names` would evaluate all xacro properties, even unused properties.
-            scope = ChainMap(dict(_bound(loop.target, value)), self._names)  # type: ignore[arg-type]
+            scope = ChainMap(dict(_bind_targets(loop.target, value)), self._names)  # type: ignore[arg-type]
             inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):
                 yield from inner._iterations(others)
 
 
-def _bound(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:
+def _bind_targets(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(target, ast.Name):
         yield target.id, value
     elif isinstance(target, ast.Tuple | ast.List):
         for part, one in zip(target.elts, value, strict=True):
-            yield from _bound(part, one)
+            yield from _bind_targets(part, one)
     else:
         text = ast.unparse(target)[:80]
         raise RefusedError(f"'{text}' is not a loop variable: use a name or a tuple of names")
 
 
-def _rule(rules: Mapping[Any, Callable[..., Any]], node: ast.expr, op: ast.AST) -> Callable[..., Any]:
+def _find_operation(
+    rules: Mapping[Any, Callable[..., Any]], node: ast.expr, op: ast.AST
+) -> Callable[..., Any]:
     if type(op) not in rules:
         raise RefusedError(f"the operator in '{ast.unparse(node)[:80]}' is not allowed")
     return rules[type(op)]

@@ -29,39 +29,40 @@ from urdfkin.errors import UrdfkinError, nearest
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
-from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
+from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
 #: Maximum number of characters of a file that a message quotes.
-QUOTED = 60
+MAX_QUOTE_LENGTH = 60
 
 
-def shortened(text: str, limit: int = QUOTED) -> str:
+def shorten(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
     return printable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
-def quoted(text: str, limit: int = QUOTED) -> str:
-    return '"' + shortened(text, limit).replace('"', '\\"') + '"'
+def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
+    return '"' + shorten(text, limit).replace('"', '\\"') + '"'
 
 
-#: A line of more than `SHOWN` characters is cut; at most `BEFORE` characters precede the underlined text.
-SHOWN, BEFORE = 100, 60
+#: A line of more than `MAX_EXCERPT_LENGTH` characters is cut. At most `MAX_EXCERPT_LEAD` characters precede
+#: the underlined text.
+MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB = "    "
 
 
-class Excerpts:
+class ExcerptFormatter:
     """Shows the lines of a file and underlines the wrong text; `data` has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
-    def of(self, finding: Finding) -> str | None:
+    def format(self, finding: Finding) -> str | None:
         """Return the line of a finding, with carets below the wrong text; None if the finding marks no text.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
-        >>> print(Excerpts(b'<axis xyz="0 0 2"/>').of(finding))
+        >>> print(ExcerptFormatter(b'<axis xyz="0 0 2"/>').format(finding))
           1 | <axis xyz="0 0 2"/>
             |       ^^^^^^^^^^^
         """
@@ -71,25 +72,25 @@ class Excerpts:
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
-        first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
-        last = first + SHOWN
+        first = max(start - MAX_EXCERPT_LEAD, 0) if len(self.text) > MAX_EXCERPT_LENGTH else 0
+        last = first + MAX_EXCERPT_LENGTH
         end = min(start + finding.width, last)
         pieces = self.text[first:start], self.text[start:end], self.text[end:last]
-        before, marked, behind = (printable(piece.replace("\t", _TAB)) for piece in pieces)
+        before, marked, after = (printable(piece.replace("\t", _TAB)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
-        caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
-        return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
+        caret = " " * (_display_width(lead) + _display_width(before)) + "^" * max(_display_width(marked), 1)
+        return f"{number} | {lead}{before}{marked}{after}{tail}\n{' ' * len(number)} | {caret}"
 
 
-def _cells(text: str) -> int:
+def _display_width(text: str) -> int:
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
 
 
 #: Upper bound (rad) on the error of rounding an angle of at most one revolution to a double.
-ROUNDING = 2.0**-50
+SAFE_ROTATION = 2.0**-50
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,19 +99,19 @@ class Fix:
 
     Attributes:
         edits: Edits of the text, in file order, without overlap.
-        turns: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the fix does
-            not change the robot.
+        max_rotation: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the
+            fix does not change the robot.
     """
 
     edits: tuple[Edit, ...]
-    turns: float = 0.0
+    max_rotation: float = 0.0
 
     @property
     def is_safe(self) -> bool:
-        return self.turns <= ROUNDING
+        return self.max_rotation <= SAFE_ROTATION
 
 
-def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
+def apply_fixes(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
     """Return the fixed bytes and the applied fixes; a fix that overlaps an earlier fix is skipped."""
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     taken, end = list[Fix](), 0
@@ -160,9 +161,9 @@ class Finding:
         column: Column number in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: If this value is not None, Pinocchio refuses the file or reads the content differently, so
-            urdfkin cannot verify any result of the robot with Pinocchio.
-        also: Line numbers of further findings with the same code that are combined into this finding.
+        pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
+            differently, so urdfkin cannot verify any result of the robot with Pinocchio.
+        other_lines: Line numbers of further findings with the same code that are combined into this finding.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -182,8 +183,8 @@ class Finding:
     column: int = 1
     element: str | None = None
     name: str | None = None
-    oracle: PinocchioReading | None = None
-    also: tuple[int, ...] = ()
+    pinocchio_reading: PinocchioReading | None = None
+    other_lines: tuple[int, ...] = ()
     width: int = 0
     fix: Fix | None = None
 
@@ -198,31 +199,31 @@ class Finding:
         """
         if self.element is None:
             return ""
-        tag = shortened(self.element)
-        if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"
-        return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
+        tag = shorten(self.element)
+        if self.element == "prim" and self.name is not None and len(self.name) > MAX_QUOTE_LENGTH:
+            return f"{tag} '...{printable(self.name[3 - MAX_QUOTE_LENGTH :])}'"
+        return tag if self.name is None else f"{tag} '{shorten(self.name)}'"
 
     @property
     def count(self) -> int:
-        """Number of findings that this object represents: 1 plus the length of `also`.
+        """Number of findings that this object represents: 1 plus the length of `other_lines`.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
         >>> finding.count
         1
         """
-        return 1 + len(self.also)
+        return 1 + len(self.other_lines)
 
     @property
-    def _other_lines(self) -> str:
-        """Text about the line numbers in `also`, for example "also on lines 3, 7"."""
-        others = tuple(sorted(set(self.also) - {self.line}))
-        if len(others) == len(self.also):
+    def _other_lines_text(self) -> str:
+        """Text about the line numbers in `other_lines`, for example "also on lines 3, 7"."""
+        others = tuple(sorted(set(self.other_lines) - {self.line}))
+        if len(others) == len(self.other_lines):
             return f"also on {_lines(others)}"
-        here = ("this line",) if self.line in self.also else ()
+        here = ("this line",) if self.line in self.other_lines else ()
         where = (*here, _lines(others)) if others else here
-        return f"{len(self.also)} more on {' and '.join(where)}"
+        return f"{len(self.other_lines)} more on {' and '.join(where)}"
 
     @property
     def sentence(self) -> str:
@@ -235,7 +236,7 @@ class Finding:
         """
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
-        also = f" ({self._other_lines})" if self.also else ""
+        also = f" ({self._other_lines_text})" if self.other_lines else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{subject}{self.message}{found}{also}{remedy}"
 
@@ -254,8 +255,8 @@ class Finding:
         data = asdict(self)
         del data["width"], data["fix"]
         data["severity"] = self.severity.value
-        data["oracle"] = self.oracle.value if self.oracle else None
-        data["also"] = list(self.also)
+        data["pinocchio_reading"] = self.pinocchio_reading.value if self.pinocchio_reading else None
+        data["other_lines"] = list(self.other_lines)
         return data
 
 
@@ -263,15 +264,15 @@ class Findings(list[Finding], Displayable):
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
-        return TextDocument(totals(self), table)
+        return TextDocument(format_counts(self), table)
 
 
-def severity_counts(findings: Sequence[Finding]) -> dict[str, int]:
+def count_by_severity(findings: Sequence[Finding]) -> dict[str, int]:
     return {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity}
 
 
-def totals(findings: Sequence[Finding]) -> str:
-    words = [f"{n} {word}{'s' if n > 1 else ''}" for word, n in severity_counts(findings).items() if n]
+def format_counts(findings: Sequence[Finding]) -> str:
+    words = [f"{n} {word}{'s' if n > 1 else ''}" for word, n in count_by_severity(findings).items() if n]
     return ", ".join(words) or "no findings"
 
 
@@ -296,7 +297,7 @@ class UrdfError(UrdfkinError, ValueError):
     """
 
     #: Maximum number of errors that the message lists.
-    SHOWN = 5
+    MAX_SHOWN_ERRORS = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
@@ -308,8 +309,8 @@ class UrdfError(UrdfkinError, ValueError):
         super().__init__(f"the URDF has {count}", where=file, remedy=remedy)
 
     def __str__(self) -> str:
-        lines = [super().__str__(), *(f"  {finding}" for finding in self._errors[: self.SHOWN])]
-        rest = sum(error.count for error in self._errors[self.SHOWN :])
+        lines = [super().__str__(), *(f"  {finding}" for finding in self._errors[: self.MAX_SHOWN_ERRORS])]
+        rest = sum(error.count for error in self._errors[self.MAX_SHOWN_ERRORS :])
         if rest:
             lines.append(f"  ... and {rest} more: see .findings or 'urdfkin check'")
         return "\n".join(lines)
@@ -341,47 +342,47 @@ class Rule:
     id: str
     slug: str
     severity: Severity
-    oracle: PinocchioReading | None = None
+    pinocchio_reading: PinocchioReading | None = None
 
 
 #: First word of a comment with an instruction for urdfkin.
-MARK = "urdfkin:"
+COMMENT_MARK = "urdfkin:"
 
 
 @dataclass(slots=True)
 class Comment:
     """A comment with an instruction for urdfkin, and the `element` that begins after the comment.
 
-    `behind` is true if other text precedes the comment on the same line.
+    `follows_text` is true if other text precedes the comment on the same line.
     """
 
     text: str
     line: int
     column: int
-    behind: bool
+    follows_text: bool
     element: Element | None = None
 
 
 @dataclass(slots=True, eq=False)
-class Silence:
-    """A comment that silences findings; `used` has the codes of the silenced findings."""
+class IgnoreComment:
+    """A comment that silences findings; `used_codes` has the codes of the silenced findings."""
 
     comment: Comment
     codes: tuple[str, ...]
     reason: str
-    used: set[str] = field(default_factory=set)
+    used_codes: set[str] = field(default_factory=set)
 
 
 @dataclass(slots=True)
-class Silences:
-    all: list[Silence] = field(default_factory=list)
+class CommentIndex:
+    comments: list[IgnoreComment] = field(default_factory=list)
     #: First comment for each key: ("line", number, code), ("element", id, code) or ("file", 0, code).
-    _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
+    _first: dict[tuple[str, int, str], IgnoreComment] = field(default_factory=dict)
 
-    def add(self, silence: Silence) -> None:
-        self.all.append(silence)
-        comment = silence.comment
-        if comment.behind:
+    def add(self, ignore: IgnoreComment) -> None:
+        self.comments.append(ignore)
+        comment = ignore.comment
+        if comment.follows_text:
             place = "line", comment.line
         elif comment.element is None:
             return
@@ -389,63 +390,63 @@ class Silences:
             place = "file", 0
         else:
             place = "element", id(comment.element)
-        for code in silence.codes:
-            self._first.setdefault((*place, code), silence)
+        for code in ignore.codes:
+            self._first.setdefault((*place, code), ignore)
 
-    def reason(self, code: str, line: int, at: Element | None) -> str | None:
+    def find_reason(self, code: str, line: int, element: Element | None) -> str | None:
         """Return the reason of the nearest comment that silences a finding, or None."""
         places = [("line", line)]
-        while at is not None:
-            places.append(("element", id(at)))
-            at = at.parent
+        while element is not None:
+            places.append(("element", id(element)))
+            element = element.parent
         for place in (*places, ("file", 0)):
-            if (silence := self._first.get((*place, code))) is not None:
-                silence.used.add(code)
-                return silence.reason
+            if (ignore := self._first.get((*place, code))) is not None:
+                ignore.used_codes.add(code)
+                return ignore.reason
         return None
 
 
 #: Maximum number of misspelt names in a file for which similar names are suggested.
-SEARCHES = 20
+MAX_SEARCHES = 20
 #: Limits of one search for similar names: number of names, and number of compared pairs of characters.
-CANDIDATES, WORK = 5_000, 250_000
+MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: If a code has at least this number of warnings or notes, one finding represents all of them.
-#: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
-FOLDED, FOLDED_EXTRAS = 4, 2
+#: `MIN_FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
+MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
 #: If more errors than this have the same code, the further errors are combined into one.
-ERRORS_SHOWN = 100
+MAX_ERRORS_PER_CODE = 100
 
 #: Maximum number of complete findings with one code. For further findings, only the line number is stored.
-WRITTEN_OUT = 10_000
+MAX_COMPLETE_FINDINGS = 10_000
 
 
 @dataclass(slots=True)
-class _Kind:
+class _FindingGroup:
     """Findings of one code and severity.
 
     Attributes:
-        found: Pairs of a finding and its weight; at most `WRITTEN_OUT` pairs.
-        lines: Line numbers of all further findings.
+        pairs: Pairs of a finding and its weight; at most `MAX_COMPLETE_FINDINGS` pairs.
+        further_lines: Line numbers of all further findings.
     """
 
     severity: Severity
-    found: list[tuple[Finding, float]] = field(default_factory=list)
-    lines: array[int] = field(default_factory=lambda: array("q"))
+    pairs: list[tuple[Finding, float]] = field(default_factory=list)
+    further_lines: array[int] = field(default_factory=lambda: array("q"))
 
 
 @dataclass(slots=True)
 class Reporter:
     file: str
     data: bytes = b""
-    limits: Limits = DEFAULT_LIMITS
+    limits: SizeLimits = DEFAULT_SIZE_LIMITS
     comments: list[Comment] = field(default_factory=list)
-    silenced: list[tuple[Finding, str]] = field(default_factory=list)
-    silences: Silences = field(default_factory=Silences)
+    silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
+    comment_index: CommentIndex = field(default_factory=CommentIndex)
     _searches: int = 0
     _raw_blanks: bool | None = None
-    _kinds: dict[tuple[str, Severity], _Kind] = field(default_factory=dict)
+    _groups: dict[tuple[str, Severity], _FindingGroup] = field(default_factory=dict)
     _element: Element | None = None
     _attributes: dict[str, _AttributeSpan] = field(default_factory=dict)
 
@@ -453,7 +454,7 @@ class Reporter:
         self,
         rule: Rule,
         message: str,
-        at: Element | None = None,
+        element: Element | None = None,
         *,
         attribute: str | None = None,
         found: str | None = None,
@@ -464,74 +465,83 @@ class Reporter:
         weight: float = 0.0,
         fix: Callable[[], Fix | None] | None = None,
     ) -> None:
-        """Add a finding about the element `at`, or about the line and column `position`.
+        """Add a finding about an element, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains `at`. If `misplaced` is True, the finding names
-        `at` itself. If warnings or notes are combined, the one with the greatest `weight` is reported.
+        The finding names the child of `<robot>` that contains the element. If `misplaced` is True, the
+        finding names the element itself. If warnings or notes are combined, the one with the greatest
+        `weight` is reported.
         """
         severity = rule.severity if severity is None else severity
         reason = None
-        if self.silences.all and severity is not Severity.ERROR:  # A comment cannot silence an error.
-            start = position[0] if at is None else self._place(at, attribute)[0]
-            reason = self.silences.reason(rule.id, start, at)
-        kind = self._kinds.setdefault((rule.id, severity), _Kind(severity))
-        if len(kind.found if reason is None else self.silenced) >= WRITTEN_OUT:
+        if (
+            self.comment_index.comments and severity is not Severity.ERROR
+        ):  # A comment cannot silence an error.
+            start = position[0] if element is None else self._locate(element, attribute)[0]
+            reason = self.comment_index.find_reason(rule.id, start, element)
+        group = self._groups.setdefault((rule.id, severity), _FindingGroup(severity))
+        if len(group.pairs if reason is None else self.silenced_findings) >= MAX_COMPLETE_FINDINGS:
             if reason is None:
-                kind.lines.append(position[0] if at is None else at.line)
+                group.further_lines.append(position[0] if element is None else element.line)
             return
         line, column, width = (*position, 0) if position == (1, 1) else (*position, 1)
-        element, name = None, None
-        if at is not None:
-            line, column, width = self._place(at, attribute)
-            subject = at if misplaced else at.holder
-            element, name = subject.tag, subject.attributes.get("name") if at.parent is not None else None
+        tag, name = None, None
+        if element is not None:
+            line, column, width = self._locate(element, attribute)
+            subject = element if misplaced else element.top_element
+            tag, name = subject.tag, subject.attributes.get("name") if element.parent is not None else None
         finding = Finding(
-            rule.id, severity, message, found, remedy, self.file, line, column, element, name, rule.oracle,
-            width=width, fix=None if fix is None or reason is not None else fix(),
+            rule.id, severity, message, found, remedy, self.file, line, column, tag, name,
+            rule.pinocchio_reading, width=width, fix=None if fix is None or reason is not None else fix(),
         )  # fmt: skip
         if reason is None:
-            kind.found.append((finding, weight))
+            group.pairs.append((finding, weight))
         else:
-            self.silenced.append((finding, reason))
+            self.silenced_findings.append((finding, reason))
 
-    def silence(self, silences: Silences) -> None:
+    def silence(self, comment_index: CommentIndex) -> None:
         """Apply comments to all findings, including findings that are added later."""
-        self.silences = silences
-        for (code, severity), kind in self._kinds.items():
+        self.comment_index = comment_index
+        for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:
-                reasons = [(pair, silences.reason(code, pair[0].line, None)) for pair in kind.found]
-                self.silenced += [(finding, reason) for (finding, _), reason in reasons if reason is not None]
-                kind.found = [pair for pair, reason in reasons if reason is None]
+                reasons = [
+                    (pair, comment_index.find_reason(code, pair[0].line, None)) for pair in group.pairs
+                ]
+                self.silenced_findings += [
+                    (finding, reason) for (finding, _), reason in reasons if reason is not None
+                ]
+                group.pairs = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three similar names, or [] after `SEARCHES` calls."""
+        """Return up to three similar names, or [] after `MAX_SEARCHES` calls."""
         self._searches += 1
-        if self._searches > SEARCHES:
+        if self._searches > MAX_SEARCHES:
             return []
-        return nearest(word, islice(known, CANDIDATES), work=WORK)
+        return nearest(word, islice(known, MAX_CANDIDATES), work=MAX_COMPARED_PAIRS)
 
     def is_full(self, rule: Rule) -> bool:
-        kind = self._kinds.get((rule.id, rule.severity))
-        return kind is not None and len(kind.found) >= WRITTEN_OUT
+        group = self._groups.get((rule.id, rule.severity))
+        return group is not None and len(group.pairs) >= MAX_COMPLETE_FINDINGS
 
     @property
-    def failed(self) -> bool:
-        return any(severity is Severity.ERROR for _, severity in self._kinds)
+    def has_errors(self) -> bool:
+        return any(severity is Severity.ERROR for _, severity in self._groups)
 
     def findings(
-        self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
+        self, *, fold: bool = True, is_reported: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line; `wanted` is called once for each finding, in file order."""
-        pairs = [pair for kind in self._kinds.values() for pair in kind.found]
-        if wanted is not None:
-            pairs.sort(key=lambda pair: _place_in_file(pair[0]))
-            pairs = [pair for pair in pairs if wanted(pair[0])]
+        """Return the findings by line; `is_reported` is called once for each finding, in file order."""
+        pairs = [pair for group in self._groups.values() for pair in group.pairs]
+        if is_reported is not None:
+            pairs.sort(key=lambda pair: _sort_key(pair[0]))
+            pairs = [pair for pair in pairs if is_reported(pair[0])]
         reported = {id(pair) for pair in pairs}
-        found: list[Finding] = []
-        for kind in self._kinds.values():
-            if own := [pair for pair in kind.found if id(pair) in reported]:
-                found += _combine(_Kind(kind.severity, own, kind.lines), fold=fold)
-        return tuple(sorted(found, key=_place_in_file))
+        findings: list[Finding] = []
+        for group in self._groups.values():
+            if pairs_of_group := [pair for pair in group.pairs if id(pair) in reported]:
+                findings += _combine(
+                    _FindingGroup(group.severity, pairs_of_group, group.further_lines), fold=fold
+                )
+        return tuple(sorted(findings, key=_sort_key))
 
     @property
     def has_raw_blanks(self) -> bool:
@@ -543,49 +553,51 @@ class Reporter:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
-    def raw(self, at: Element, attribute: str) -> str | None:
+    def raw_value(self, element: Element, attribute: str) -> str | None:
         """Return an attribute value as written in the file."""
-        span = self._spans(at).get(attribute)
+        span = self._spans(element).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
-    def _spans(self, at: Element) -> dict[str, _AttributeSpan]:
-        if self._element is not at:
-            self._element, self._attributes = at, dict(_attributes(self.data, at))
+    def _spans(self, element: Element) -> dict[str, _AttributeSpan]:
+        if self._element is not element:
+            self._element, self._attributes = element, dict(_attributes(self.data, element))
         return self._attributes
 
-    def _place(self, at: Element, attribute: str | None) -> tuple[int, int, int]:
-        span = None if attribute is None else self._spans(at).get(attribute)
+    def _locate(self, element: Element, attribute: str | None) -> tuple[int, int, int]:
+        span = None if attribute is None else self._spans(element).get(attribute)
         if span is None:
-            return at.line, at.column, 1 + len(at.tag)
+            return element.line, element.column, 1 + len(element.tag)
         first = NEWLINE.split(self.data[span.start : span.value[1] + 1], 1)[0]
         return span.line, span.column, len(first.decode("utf-8", "replace"))
 
-    def rewritten(self, at: Element, attribute: str, value: str, turns: float = 0.0) -> Fix | None:
-        span = self._spans(at).get(attribute)
-        return None if span is None else Fix((Edit(*span.value, value),), turns)
+    def make_value_fix(
+        self, element: Element, attribute: str, value: str, max_rotation: float = 0.0
+    ) -> Fix | None:
+        span = self._spans(element).get(attribute)
+        return None if span is None else Fix((Edit(*span.value, value),), max_rotation)
 
-    def without(self, at: Element, *attributes: str) -> Fix | None:
+    def make_removal_fix(self, element: Element, *attributes: str) -> Fix | None:
         """Return the fix that removes attributes."""
-        existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
+        existing = [span for name in attributes if (span := self._spans(element).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
-        edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)
+        edits = tuple(Edit(start_of_blanks(self.data, start), end) for start, end in spans)
         return Fix(edits) if edits else None
 
-    def without_element(self, at: Element) -> Fix | None:
+    def make_element_removal_fix(self, element: Element) -> Fix | None:
         """Return the fix that removes an element; None if the element has content."""
-        tag = START_TAG.match(self.data, at.offset)
+        tag = START_TAG.match(self.data, element.offset)
         if tag is None:
             return None
         end = tag.end()
         if not tag[0].endswith(b"/>"):
-            closing = re.compile(rb"[ \t\r\n]*</" + re.escape(at.tag.encode()) + rb"[ \t\r\n]*>")
+            closing = re.compile(rb"[ \t\r\n]*</" + re.escape(element.tag.encode()) + rb"[ \t\r\n]*>")
             if (closed := closing.match(self.data, end)) is None:
                 return None
             end = closed.end()
-        start = blanks_before(self.data, at.offset, b" \t")
+        start = start_of_blanks(self.data, element.offset, b" \t")
         rest = _REST_OF_LINE.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
-        return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(at.offset, end),))
+        return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(element.offset, end),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -606,44 +618,46 @@ NEWLINE = re.compile(rb"\r\n|\r|\n")
 _REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
-def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]]:
-    tag = START_TAG.match(data, at.offset)
+def _attributes(data: bytes, element: Element) -> Iterator[tuple[str, _AttributeSpan]]:
+    tag = START_TAG.match(data, element.offset)
     if tag is None:
         return
-    line, column, cursor = at.line, at.column, at.offset
-    for match in ATTRIBUTE.finditer(data, at.offset + len(at.tag.encode()) + 1, tag.end()):
+    line, column, cursor = element.line, element.column, element.offset
+    for match in ATTRIBUTE.finditer(data, element.offset + len(element.tag.encode()) + 1, tag.end()):
         lines = NEWLINE.split(data[cursor : match.start()])
         column = len(lines[-1].decode("utf-8", "replace")) + (column if len(lines) == 1 else 1)
         line, cursor = line + len(lines) - 1, match.start()
         yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))
 
 
-def blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
+def start_of_blanks(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
     """Return the index at which the white space before `start` begins."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start
 
 
-def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
+def _sort_key(finding: Finding) -> tuple[int, int, int, str, str]:
     return finding.line, finding.column, finding.severity.rank, finding.code, finding.message
 
 
-def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Combine findings of one kind.
+def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
+    """Combine the findings of a group.
 
-    The last returned finding contains, in `also`, the line numbers of the findings that are not returned.
+    In the last returned finding, `other_lines` has the line numbers of the findings that are not returned.
     """
-    kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
-    found = [finding for finding, _ in kind.found]
-    into_one = fold and kind.severity is not Severity.ERROR
-    if into_one and len(found) >= (FOLDED_EXTRAS if found[0].code.startswith("URDF7") else FOLDED):
-        best = max(range(len(found)), key=lambda i: kind.found[i][1])
-        complete, rest = [found.pop(best)], found
+    group.pairs.sort(key=lambda pair: _sort_key(pair[0]))
+    findings = [finding for finding, _ in group.pairs]
+    into_one = fold and group.severity is not Severity.ERROR
+    if into_one and len(findings) >= (
+        MIN_FOLDED_EXTRAS if findings[0].code.startswith("URDF7") else MIN_FOLDED
+    ):
+        best = max(range(len(findings)), key=lambda i: group.pairs[i][1])
+        complete, rest = [findings.pop(best)], findings
     else:
-        most = ERRORS_SHOWN if fold else len(found)
-        complete, rest = found[:most], found[most:]
-    lines = sorted([*(finding.line for finding in rest), *kind.lines])
+        most = MAX_ERRORS_PER_CODE if fold else len(findings)
+        complete, rest = findings[:most], findings[most:]
+    lines = sorted([*(finding.line for finding in rest), *group.further_lines])
     if lines:
-        complete[-1] = replace(complete[-1], also=tuple(lines))
+        complete[-1] = replace(complete[-1], other_lines=tuple(lines))
     return complete

@@ -19,9 +19,9 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, unique
+from urdfkin.urdf.mjcf import SLIDE_LIMIT, make_fixed_joint, make_unique
 from urdfkin.urdf.parser import QUATERNION
-from urdfkin.urdf.reader import joint_rows, root_link
+from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
 from urdfkin.urdf.writer import to_urdf
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
 #: Maximum number of joint names in a finding.
-_NAMED = 5
+_MAX_NAMES = 5
 
 #: Placeholder for the XML element in records that do not come from a file.
 _NO_ELEMENT = Element("", {}, None, 0, 0, 0)
@@ -47,17 +47,17 @@ class XmlTree(Protocol):
     def getroot(self) -> Any: ...
 
 
-def text_of(source: Any) -> tuple[str, str] | None:
+def convert_to_urdf(source: Any) -> tuple[str, str] | None:
     """Return the URDF text of another library's object and the object's name in messages, or None."""
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
-        return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
+        return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
     root = source.getroot() if hasattr(source, "getroot") else source
     if hasattr(root, "tag") and hasattr(root, "attrib") and hasattr(root, "iter"):
-        return _text(root), "<ElementTree>"
+        return _serialize(root), "<ElementTree>"
     return None
 
 
-def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
+def find_lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     """Return a finding if yourdfpy (0.0.60), which ignores quat_xyzw, may have lost rotations."""
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -69,25 +69,26 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     ]
     if not joints:
         return ()
-    more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
+    more = f" and {len(joints) - _MAX_NAMES} more" if len(joints) > _MAX_NAMES else ""
+    names = f"{', '.join(joints[:_MAX_NAMES])}{more}"
     message = (
-        f"yourdfpy ignores quat_xyzw, so the rotation of joint {', '.join(joints[:_NAMED])}{more} is lost if"
+        f"yourdfpy ignores quat_xyzw, so the rotation of joint {names} is lost if"
         " the file gives the rotation by quat_xyzw"
     )
     remedy = "if the file contains quat_xyzw, load the file instead of the yourdfpy robot"
     return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
-def urdf_of(robot: yourdf.Robot) -> str:
+def convert_yourdfpy_robot(robot: yourdf.Robot) -> str:
     """Return the URDF of a yourdfpy robot; yourdfpy's own writer (0.0.60) omits mimic rules.
 
     The axes are not normalised, so that `check` can report their lengths.
     """
     try:
-        records = [_record(joint) for joint in robot.joints]
+        records = [_make_joint_record(joint) for joint in robot.joints]
         axes = {record.name: np.array(record.axis) for record in records}
-        rows = [(replace(one, axis=axes[one.name]), up, down) for one, up, down in joint_rows(records)]
-        root = root_link(robot.name, [link.name for link in robot.links], records)
+        rows = [(replace(one, axis=axes[one.name]), up, down) for one, up, down in make_joint_rows(records)]
+        root = find_root_link(robot.name, [link.name for link in robot.links], records)
         return to_urdf(build_tree(robot.name, root, rows))
     except UrdfkinError:
         raise
@@ -95,7 +96,7 @@ def urdf_of(robot: yourdf.Robot) -> str:
         raise InputError("yourdfpy's robot cannot be written as a URDF", found=str(error)) from error
 
 
-def _record(joint: yourdf.Joint) -> JointRecord:
+def _make_joint_record(joint: yourdf.Joint) -> JointRecord:
     T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
     axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
     limit, rule = joint.limit, joint.mimic
@@ -108,7 +109,7 @@ def _record(joint: yourdf.Joint) -> JointRecord:
     )  # fmt: skip
 
 
-def _text(root: Any) -> str:
+def _serialize(root: Any) -> str:
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -127,7 +128,7 @@ def _text(root: Any) -> str:
 
 #: Names of Pinocchio's joint classes whose axis is the x, y or z axis of the joint frame.
 #: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
-_ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
+_ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
     "RUB": JointKind.CONTINUOUS,
@@ -139,11 +140,11 @@ _KINDS = {
     "JointModelPlanar": JointKind.PLANAR,
 }
 #: Limits above this number are treated as infinite. Pinocchio stores a missing limit as the largest double.
-_ENDLESS = 1e300
+_INFINITE_LIMIT = 1e300
 
 
 @dataclass(frozen=True, slots=True)
-class Modelled:
+class ConvertedModel:
     """The kinematic tree of a Pinocchio model, with the index of each link's Pinocchio joint or frame.
 
     `joints` contains the joint index of each link whose frame is a joint frame. `frames` contains the frame
@@ -155,15 +156,15 @@ class Modelled:
     frames: dict[str, int]
 
 
-def is_model(source: object) -> TypeGuard[Any]:
+def is_pinocchio_model(source: object) -> TypeGuard[Any]:
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
-def tree_of_model(source: Any) -> Modelled:
+def convert_pinocchio_model(source: Any) -> ConvertedModel:
     """Convert a `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
     model = getattr(source, "model", source)
-    return _ModelReader(model).read()
+    return _ModelReader(model).convert()
 
 
 class _ModelReader:
@@ -171,15 +172,15 @@ class _ModelReader:
         self.model = model
         self.frames = list(model.frames)
         self.kinds = [str(frame.type) for frame in self.frames]
-        self.link_names, self.joint_names = set[str](), set(map(str, model.names))
-        self.places = [np.array(frame.placement.homogeneous) for frame in self.frames]
+        self.used_link_names, self.used_joint_names = set[str](), set(map(str, model.names))
+        self.placements = [np.array(frame.placement.homogeneous) for frame in self.frames]
         self.bodies = dict(self._bodies_on_joints())
         joints = range(int(model.njoints))
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
         #: Name of the link that each joint moves, by the joint's index.
-        self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
+        self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
         #: Name of the link of each converted frame, by the frame's index.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
@@ -190,25 +191,25 @@ class _ModelReader:
         The last body comes first, so a dictionary keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
-            if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
+            if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
-    def read(self) -> Modelled:
+    def convert(self) -> ConvertedModel:
         """Convert all frames, then all moving joints.
 
         In Pinocchio, the index of a parent frame is lower than the indices of its child frames.
         """
         for i in range(len(self.frames)):
-            self._frame(i)
+            self._convert_frame(i)
         frames = zip(self.frames, self.kinds, strict=True)
         own = {int(frame.parentJoint): frame for frame, kind in frames if kind == "JOINT"}
         for j in range(1, int(self.model.njoints)):
             T = np.array(self.model.jointPlacements[j].homogeneous)
             link, T = self._attachment(own.get(j), int(self.model.parents[j]), T)
-            self.rows.append((self._joint(j, T), link, self.carriers[j]))
-        tree = build_tree(str(self.model.name) or "robot", self.carriers[0], self.rows)
-        joints = {link: j for j, link in self.carriers.items()}
-        return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
+            self.rows.append((self._make_joint(j, T), link, self.links_of_joints[j]))
+        tree = build_tree(str(self.model.name) or "robot", self.links_of_joints[0], self.rows)
+        joints = {link: j for j, link in self.links_of_joints.items()}
+        return ConvertedModel(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
         """Return the parent link of a frame, and the pose of the frame relative to this link.
@@ -217,34 +218,39 @@ class _ModelReader:
         """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
-            return self.carriers[joint], T
-        return self.links[i], inverse(self.places[i]) @ T
+            return self.links_of_joints[joint], T
+        return self.links[i], inverse(self.placements[i]) @ T
 
-    def _frame(self, i: int) -> None:
+    def _convert_frame(self, i: int) -> None:
         frame, kind = self.frames[i], self.kinds[i]
         joint, above = int(frame.parentJoint), int(frame.parentFrame)
         if i == 0 or kind == "JOINT" or self.bodies.get(joint) == i:
-            self.links[i] = self.carriers[joint]
+            self.links[i] = self.links_of_joints[joint]
             return
         fixed = self.kinds[above] == "FIXED_JOINT" and above > 0
-        if kind == "BODY" and fixed and (self.places[i] == self.places[above]).all() and above in self.links:
+        if (
+            kind == "BODY"
+            and fixed
+            and (self.placements[i] == self.placements[above]).all()
+            and above in self.links
+        ):
             self.links[i] = self.links[above]
             return
-        link, T = self._attachment(frame, joint, self.places[i])
+        link, T = self._attachment(frame, joint, self.placements[i])
         if kind == "FIXED_JOINT":
             body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
-            child = unique(frame.name if body is None else body.name, self.link_names)
+            child = make_unique(frame.name if body is None else body.name, self.used_link_names)
             name = frame.name
         else:
-            child, name = unique(frame.name, self.link_names), f"{frame.name}_fixed"
-        self.rows.append((fixed_joint(unique(name, self.joint_names), T), link, child))
+            child, name = make_unique(frame.name, self.used_link_names), f"{frame.name}_fixed"
+        self.rows.append((make_fixed_joint(make_unique(name, self.used_joint_names), T), link, child))
         self.links[i] = child
 
-    def _joint(self, j: int, T: FloatArray) -> Joint:
+    def _make_joint(self, j: int, T: FloatArray) -> Joint:
         model = self.model
         joint, name = model.joints[j], str(model.names[j])
         class_name = str(joint.shortname())
-        aligned = _ALIGNED.fullmatch(class_name)
+        aligned = _ALIGNED_CLASS.fullmatch(class_name)
         kind = _KINDS.get(aligned[1] if aligned else class_name)
         if kind is None:
             mimics = class_name.endswith("Mimic")
@@ -273,9 +279,9 @@ class _ModelReader:
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
+                lower, upper = max(lower, -SLIDE_LIMIT), min(upper, SLIDE_LIMIT)
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 
 def _finite(value: float) -> float:
-    return math.copysign(math.inf, value) if abs(value) > _ENDLESS else float(value)
+    return math.copysign(math.inf, value) if abs(value) > _INFINITE_LIMIT else float(value)

@@ -10,7 +10,7 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 - The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
   MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
 
-`Mjcf.listed` names the parts of the file that a kinematic tree cannot represent, for example tendons.
+`Mjcf.remarks` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
 The inertial frame depends on the shapes, so MuJoCo needs the meshes to compile a file with such an option.
@@ -28,9 +28,9 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import rotation_about, rotation_of
+from urdfkin.kinematics.rotation import rotation_about, rotation_from_quaternion
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -41,19 +41,19 @@ from urdfkin.model.tree import (
     pose,
 )
 from urdfkin.system.files import at_home, read_start
-from urdfkin.urdf.mujoco import compiled, library
+from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
 #: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
-UNBOUNDED = 1000.0
+SLIDE_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
-_ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
+_ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
 #: Number of bytes that are read from a file to find the root element.
-_HEAD = 65_536
+_SEARCHED_BYTES = 65_536
 
 
 @dataclass(frozen=True, slots=True)
-class Listed:
+class MjcfRemark:
     """A part of the file that the tree omits or changes, or a probable mistake in the file.
 
     Attributes:
@@ -74,25 +74,27 @@ class Mjcf:
 
     Attributes:
         model: MuJoCo's compiled model, in which all bodies remain separate.
-        fused: The model with fused static bodies; None unless `whole` is True and the file sets `fusestatic`.
+        fused_model: The model with fused static bodies; None unless `with_shapes` is True and the file sets
+            `fusestatic`.
         frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
-        coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
-        rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
-        apart: Indices of the active joint equalities that are not mimic rules of the tree.
-        whole: Whether `model` contains the shapes and inertias of the file.
-        aligns: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
+        qpos_index: Index in MuJoCo's qpos of each moving joint, including mimic joints.
+        mimic_equalities: Name of the mimic joint for each equality that is a mimic rule, by the equality's
+            index.
+        other_equalities: Indices of the active joint equalities that are not mimic rules of the tree.
+        with_shapes: Whether `model` contains the shapes and inertias of the file.
+        aligns_free_bodies: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
     """
 
     tree: KinematicTree
     model: Any
-    fused: Any
+    fused_model: Any
     frames: dict[str, tuple[str, int]]
-    coordinates: dict[str, int]
-    rules: dict[int, str]
-    apart: frozenset[int]
-    listed: tuple[Listed, ...]
-    whole: bool
-    aligns: bool
+    qpos_index: dict[str, int]
+    mimic_equalities: dict[int, str]
+    other_equalities: frozenset[int]
+    remarks: tuple[MjcfRemark, ...]
+    with_shapes: bool
+    aligns_free_bodies: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's qpos for urdfkin's q (n, nq).
@@ -101,9 +103,9 @@ class Mjcf:
         """
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
-            if joint.name not in self.coordinates:
+            if joint.name not in self.qpos_index:
                 continue
-            to = self.coordinates[joint.name]
+            to = self.qpos_index[joint.name]
             if joint.kind is JointKind.FLOATING:
                 unit = q[:, at + 3 : at + 7] / np.linalg.norm(q[:, at + 3 : at + 7], axis=1, keepdims=True)
                 full[:, to : to + 3], full[:, to + 3 : to + 7] = q[:, at : at + 3], np.roll(unit, 1, axis=1)
@@ -116,19 +118,23 @@ class Mjcf:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`."""
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
-        if self.fused is not None:
-            own = {f: at for f, at in enumerate(map(self._in_fused, self.frames.values())) if at is not None}
-            out[:, list(own)] = _placements(self.fused, qpos, own)
+        if self.fused_model is not None:
+            own = {
+                f: at
+                for f, at in enumerate(map(self._find_in_fused_model, self.frames.values()))
+                if at is not None
+            }
+            out[:, list(own)] = _placements(self.fused_model, qpos, own)
         return out
 
-    def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        mujoco, (kind, i) = library(), frame
+    def _find_in_fused_model(self, frame: tuple[str, int]) -> tuple[str, int] | None:
+        mujoco, (kind, i) = import_mujoco(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
-        index = mujoco.mj_name2id(self.fused, what, name) if name else -1
+        index = mujoco.mj_name2id(self.fused_model, what, name) if name else -1
         return (kind, index) if index >= 0 else None
 
-    def lengths(self, q: FloatArray) -> FloatArray:
+    def distance_bounds(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
         The bound is the sum of the lengths of all translations from the world to the frame.
@@ -144,7 +150,7 @@ class Mjcf:
                     own = own + qpos[:, to] + abs(m.qpos0[to])
                 own = own + 2.0 * np.linalg.norm(m.jnt_pos[j])
             at_body[:, i] = at_body[:, m.body_parentid[i]] + own
-        return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
+        return self._frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of absolute hinge angles, in rad, for each frame, shape (n, frames).
@@ -159,15 +165,15 @@ class Mjcf:
             for _, kind, to in self._joints_of(i):
                 if kind == "hinge" and m.qpos0[to]:
                     at_body[:, i] += qpos[:, to] + abs(m.qpos0[to])
-        return self._of_frames(at_body, np.zeros(m.nsite))
+        return self._frame_values(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        m, kinds = self.model, library().mjtJoint
+        m, kinds = self.model, import_mujoco().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
-    def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
+    def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return the values of all frames (n, frames), from the values `at_body` (n, bodies) of the bodies.
 
         The value of a site is the value of its body plus the number of the site in `own` (sites,).
@@ -180,7 +186,7 @@ class Mjcf:
 
     def residuals(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's residuals (n, equalities) of active joint equalities; NaN for other equalities."""
-        mujoco, m = library(), self.model
+        mujoco, m = import_mujoco(), self.model
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
         m.opt.disableflags &= ~(int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_EQUALITY))
@@ -194,17 +200,17 @@ class Mjcf:
             out[k, ids[between_joints]] = np.asarray(data.efc_pos)[rows][between_joints]
         return out
 
-    def rule_sizes(self, q: FloatArray) -> FloatArray:
+    def rule_scales(self, q: FloatArray) -> FloatArray:
         """For each mimic rule, return a number for the bound on its rounding error, shape (n, equalities).
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint. The bound is this number times `MJCF_RULE` and `EPS`.
+        rules from y to an independent joint. The bound is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
-        by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
+        by_joint = {int(m.eq_obj1id[i]): i for i in self.mimic_equalities}
         known: dict[int, tuple[FloatArray, int]] = {}
-        for i in self.rules:
+        for i in self.mimic_equalities:
             chain = [i]
             while (above := by_joint.get(int(m.eq_obj2id[chain[-1]]))) is not None and above not in known:
                 chain.append(above)
@@ -222,7 +228,7 @@ class Mjcf:
 
 
 def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]) -> FloatArray:
-    mujoco = library()
+    mujoco = import_mujoco()
     data = mujoco.MjData(model)
     out = np.zeros((len(qpos), len(frames), 4, 4))
     out[..., 3, 3] = 1.0
@@ -238,28 +244,28 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>."""
     if isinstance(source, bytes):
-        return _ROOT.match(source.decode("utf-8-sig", "replace")) is not None
+        return _ROOT_ELEMENT.match(source.decode("utf-8-sig", "replace")) is not None
     if is_text(source):
-        return _ROOT.match(str(source).lstrip("\ufeff")) is not None
+        return _ROOT_ELEMENT.match(str(source).lstrip("\ufeff")) is not None
     if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _SUFFIXES:
         return False
     try:
-        return is_mjcf(read_start(at_home(source), _HEAD))
+        return is_mjcf(read_start(at_home(source), _SEARCHED_BYTES))
     except OSError:
         return False  # `load` reports the error later.
 
 
-def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
+def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
+    If `with_shapes` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
     """
-    mujoco = library()
-    fused = None
+    mujoco = import_mujoco()
+    fused_model = None
     try:
-        spec = _spec(mujoco, source)
-        aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
-        if whole and fuses:
+        spec = _load_spec(mujoco, source)
+        aligned, fuses = list(_find_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
+        if with_shapes and fuses:
             if merged := [body for body in aligned if body.bodies]:
                 what = (
                     "MuJoCo fuses static bodies into this free body and aligns the frame with the inertial"
@@ -267,14 +273,14 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
                 )
                 where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
                 raise InputError(what, where=where, remedy=remedy)
-            fused = compiled(_spec(mujoco, source))
+            fused_model = compile_spec(_load_spec(mujoco, source))
         spec.compiler.fusestatic = False
-        notes = list(_left_out(mujoco, spec))
-        if not whole:
-            _strip(mujoco, spec)
-        model = compiled(spec)
+        notes = list(_find_omissions(mujoco, spec))
+        if not with_shapes:
+            _remove_unused_elements(mujoco, spec)
+        model = compile_spec(spec)
         reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name)
-        tree = reader.tree()
+        tree = reader.make_tree()
     except UnicodeDecodeError as error:
         message = "this MJCF contains a name that is not UTF-8"
         remedy = "save the file as UTF-8"
@@ -284,16 +290,16 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
-    notes += [_align_note(body.name, whole=whole) for body in aligned]
+    notes += [_make_alignment_remark(body.name, with_shapes=with_shapes) for body in aligned]
     # In a file in radians, large limits are not suspicious, because some hinges turn several times.
-    notes += _angle_unit(mujoco, model) if spec.compiler.degree else ()
+    notes += _check_angle_unit(mujoco, model) if spec.compiler.degree else ()
     return Mjcf(
-        tree, model, fused, reader.frames, reader.coordinates, reader.mimic_equalities,
-        frozenset(reader.apart), (*reader.listed, *notes), whole, bool(aligned),
+        tree, model, fused_model, reader.frames, reader.qpos_index, reader.mimic_equalities,
+        frozenset(reader.other_equalities), (*reader.remarks, *notes), with_shapes, bool(aligned),
     )  # fmt: skip
 
 
-def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
+def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # A confined process cannot start threads.
     # Only dynamics needs the memory sizes in the file; -1 selects MuJoCo's default sizes.
@@ -301,7 +307,7 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     return spec
 
 
-def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
+def _find_aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
     """Yield the free bodies whose frames MuJoCo aligns with their inertial frames."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
@@ -309,25 +315,29 @@ def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
             continue
         align = spec.compiler.alignfree if joint.align == choices.mjALIGNFREE_AUTO else joint.align
         bodies = joint.parent.bodies
-        if align and not (bodies and not spec.compiler.fusestatic) and not _moving_below(joint.parent):
+        if (
+            align
+            and not (bodies and not spec.compiler.fusestatic)
+            and not _has_moving_descendants(joint.parent)
+        ):
             yield joint.parent
 
 
-def _moving_below(body: Any) -> bool:
+def _has_moving_descendants(body: Any) -> bool:
     descendants = list(body.bodies)
     for one in descendants:
         descendants += one.bodies
     return any(list(one.joints) for one in descendants)
 
 
-def _align_note(body: str, *, whole: bool) -> Listed:
+def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
     what = "MuJoCo aligns the frame of this free body with its inertial frame"
-    if not whole:
+    if not with_shapes:
         what += ", which depends on its shapes; urdfkin uses the frame in the file"
-    return Listed(what, f"body {body}" if body else "body", moves=not whole)
+    return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 
-def name_of(source: str | bytes | os.PathLike[str]) -> str:
+def source_name(source: str | bytes | os.PathLike[str]) -> str:
     return "<bytes>" if isinstance(source, bytes) else "<text>" if is_text(source) else str(source)
 
 
@@ -335,7 +345,7 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
+def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",
@@ -344,38 +354,40 @@ def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
             yield words, found
 
 
-def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
+def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
     """Yield the parts that the tree does not represent, except equalities between joints."""
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
             what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
-            yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
-    useless = dict(_useless(spec))
+            yield MjcfRemark(what, f"equality {one.name or i}", moves=bool(one.active))
+    useless = dict(_find_unused_elements(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
-        if words in useless:
-            yield Listed(f"urdfkin ignores {words}", tag, moves=True)
+        if useless.pop(words, None):
+            yield MjcfRemark(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
-        yield Listed(f"kinematics does not use {counts}")
+        yield MjcfRemark(f"kinematics does not use {counts}")
 
 
-def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
+def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
     """Yield a finding if a file declares degrees, but all its hinge limits are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
-    if 0.0 < largest <= LARGEST_ANGLE:
+    if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
         what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
-        yield Listed(what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees')
+        yield MjcfRemark(
+            what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees'
+        )
 
 
-def _strip(mujoco: Any, spec: Any) -> None:
+def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     """Remove elements that kinematics does not need, so that mesh files may be missing."""
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for one in list(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             spec.delete(one)
-    for _, found in _useless(spec):
+    for _, found in _find_unused_elements(spec):
         for one in found:
             spec.delete(one)
     for site in spec.sites:
@@ -404,57 +416,59 @@ class _MjcfReader:
     name: str
     source: str
     frames: dict[str, tuple[str, int]] = field(default_factory=dict)
-    coordinates: dict[str, int] = field(default_factory=dict)
-    listed: list[Listed] = field(default_factory=list)
+    qpos_index: dict[str, int] = field(default_factory=dict)
+    remarks: list[MjcfRemark] = field(default_factory=list)
     mimic_equalities: dict[int, str] = field(default_factory=dict)
-    apart: set[int] = field(default_factory=set)
+    other_equalities: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
     _link_names: set[str] = field(default_factory=set)
     _joint_names: set[str] = field(default_factory=set)
     _links: list[str] = field(default_factory=list)
     _hinges: dict[int, str] = field(default_factory=dict)
 
-    def tree(self) -> KinematicTree:
+    def make_tree(self) -> KinematicTree:
         m = self.model
-        self._links = [unique(m.body(i).name or f"body{i}", self._link_names) for i in range(m.nbody)]
-        self._hinges = {i: unique(m.joint(i).name or f"joint{i}", self._joint_names) for i in range(m.njnt)}
+        self._links = [make_unique(m.body(i).name or f"body{i}", self._link_names) for i in range(m.nbody)]
+        self._hinges = {
+            i: make_unique(m.joint(i).name or f"joint{i}", self._joint_names) for i in range(m.njnt)
+        }
         for i in range(m.nbody):
             self.frames[self._links[i]] = "body", i
             if i:
-                self._body(i)
+                self._add_body(i)
         for i in range(m.nsite):
             if name := m.site(i).name:
-                link = unique(name, self._link_names)
+                link = make_unique(name, self._link_names)
                 self.frames[link] = "site", i
                 T = _pose(m.site_pos[i], m.site_quat[i])
-                self._fix(T, self._links[m.site_bodyid[i]], link)
-        rules = dict(self._rules())
+                self._add_fixed_joint(T, self._links[m.site_bodyid[i]], link)
+        rules = dict(self._read_rules())
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
         return build_tree(self.name, self._links[0], joints)
 
-    def _fix(self, T: FloatArray, parent: str, child: str) -> None:
-        name = unique(f"{child}_fixed", self._joint_names)
-        self._joints.append((fixed_joint(name, T), parent, child))
+    def _add_fixed_joint(self, T: FloatArray, parent: str, child: str) -> None:
+        name = make_unique(f"{child}_fixed", self._joint_names)
+        self._joints.append((make_fixed_joint(name, T), parent, child))
 
-    def _body(self, i: int) -> None:
+    def _add_body(self, i: int) -> None:
         m, here = self.model, self._links[self.model.body_parentid[i]]
         T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
             what = "a mocap body is fixed at its pose in the file"
-            self.listed.append(Listed(what, f"body {link}", moves=True))
+            self.remarks.append(MjcfRemark(what, f"body {link}", moves=True))
         joints = _joint_indices(m, i)
         for j in joints:
             anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
             ends_here = j == joints[-1] and not m.jnt_pos[j].any()
-            child = link if ends_here else unique(f"{name}_link", self._link_names)
-            joint, back = self._joint(j, name, T @ anchor)
+            child = link if ends_here else make_unique(f"{name}_link", self._link_names)
+            joint, back = self._make_joint(j, name, T @ anchor)
             self._joints.append((joint, here, child))
-            self.coordinates[name] = int(m.jnt_qposadr[j])
+            self.qpos_index[name] = int(m.jnt_qposadr[j])
             T, here = back, child
         if here != link:
-            self._fix(T, here, link)
+            self._add_fixed_joint(T, here, link)
 
-    def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
+    def _make_joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
         """Return the joint with index `j`, and the pose of its body in the joint frame.
 
         T is the joint's origin without the joint's reference value.
@@ -471,15 +485,15 @@ class _MjcfReader:
             if m.qpos0[at : at + 3].any() or m.qpos0[at + 3] != 1.0:
                 zero = "in the neutral configuration the body is at the origin"
                 what = f"qpos0 places this body at ({place}); {zero}"
-                self.listed.append(Listed(what, f"joint {name}"))
+                self.remarks.append(MjcfRemark(what, f"joint {name}"))
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
         reference, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
         if reference:
             T = T @ (pose(rotation_about(axis, -reference)) if turns else pose(p=-reference * axis))
-        urdf_kind, limit = self._range(j, name, turns=turns)
+        urdf_kind, limit = self._make_limit(j, name, turns=turns)
         return Joint(name, urdf_kind, 0, T, axis, limit), back
 
-    def _range(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
+    def _make_limit(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
         m = self.model
         effort = float(m.jnt_actfrcrange[j].max()) if m.jnt_actfrclimited[j] else np.inf
         if m.jnt_limited[j]:
@@ -488,35 +502,35 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        what = f"a slide joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
-        self.listed.append(Listed(what, f"joint {name}"))
-        return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
+        what = f"a slide joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
+        self.remarks.append(MjcfRemark(what, f"joint {name}"))
+        return JointKind.PRISMATIC, Limit(-SLIDE_LIMIT, SLIDE_LIMIT, np.inf, effort)
 
-    def _rules(self) -> Iterator[tuple[str, Mimic]]:
+    def _read_rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
                 continue
             where = f"equality {m.equality(i).name or i}"
-            rule = self._rule(i)
+            rule = self._read_rule(i)
             if not m.eq_active0[i]:
-                self.listed.append(Listed("a constraint that is not active", where))
+                self.remarks.append(MjcfRemark("a constraint that is not active", where))
                 continue
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is not a linear relation of two joints"
-            elif rule[0] in rules or leads(rules, rule[1].leader, rule[0]):
-                what = f"joint {rule[0]} has two rules, or its rules form a circle"
+            elif rule[0] in rules or depends_on(rules, rule[1].leader, rule[0]):
+                what = f"joint {rule[0]} has two rules, or its rules form a cycle"
             else:
                 rules[rule[0]] = rule[1]
                 self.mimic_equalities[i] = rule[0]
                 continue
-            self.apart.add(i)
-            self.listed.append(Listed(what, where, moves=True))
+            self.other_equalities.add(i)
+            self.remarks.append(MjcfRemark(what, where, moves=True))
         for name in rules:
-            yield name, resolve(rules, name)
+            yield name, resolve_rule(rules, name)
 
-    def _rule(self, i: int) -> tuple[str, Mimic] | None:
+    def _read_rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
 
         Here x0 and y0 are the joints' reference values. Return None if the equality is not a linear relation
@@ -531,26 +545,26 @@ class _MjcfReader:
         return self._hinges[y], Mimic(self._hinges[x], float(c[1]), float(y0 + c[0] - c[1] * x0))
 
 
-def unique(name: str, taken: set[str]) -> str:
-    """Append underscores to a name until it is unique; add the name to `taken`."""
-    while name in taken:
+def make_unique(name: str, used_names: set[str]) -> str:
+    """Append underscores to a name until it is unique; add the name to `used_names`."""
+    while name in used_names:
         name += "_"
-    taken.add(name)
+    used_names.add(name)
     return name
 
 
-def fixed_joint(name: str, T: FloatArray) -> Joint:
+def make_fixed_joint(name: str, T: FloatArray) -> Joint:
     return Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
 
 
-def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
-    """Return whether the chain of mimicked joints that begins at `joint` contains `to`."""
-    while joint in rules and joint != to:
+def depends_on(rules: Mapping[str, Mimic], joint: str, other: str) -> bool:
+    """Return whether the chain of mimicked joints that begins at `joint` contains `other`."""
+    while joint in rules and joint != other:
         joint = rules[joint].leader
-    return joint == to
+    return joint == other
 
 
-def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
+def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     """Combine a chain of mimic rules into one rule relative to an independent joint."""
     rule = rules[joint]
     while rule.leader in rules:
@@ -560,4 +574,4 @@ def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
 
 
 def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
-    return pose(rotation_of(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)
+    return pose(rotation_from_quaternion(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

@@ -9,7 +9,7 @@ from urdfkin.errors import InputError
 from urdfkin.system.lazy_import import install_remedy, installed_version
 
 
-def library() -> Any:
+def import_mujoco() -> Any:
     """Return the module `mujoco`; raise InputError if MuJoCo is not installed."""
     try:
         import mujoco
@@ -18,7 +18,7 @@ def library() -> Any:
     return mujoco
 
 
-def compiled(spec: Any) -> Any:
+def compile_spec(spec: Any) -> Any:
     """Compile a specification; ignore MuJoCo's warnings, which are about dynamics."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)

@@ -22,10 +22,10 @@ from xml.parsers import expat
 from urdfkin.errors.numbers import DECIMAL
 from urdfkin.system.files import Edit
 from urdfkin.urdf.findings import (
+    COMMENT_MARK,
     ERROR,
-    MARK,
+    MAX_QUOTE_LENGTH,
     NOTE,
-    QUOTED,
     REFUSES,
     WARNING,
     Comment,
@@ -33,9 +33,9 @@ from urdfkin.urdf.findings import (
     Reporter,
     Rule,
     Severity,
-    blanks_before,
-    quoted,
-    shortened,
+    quote,
+    shorten,
+    start_of_blanks,
 )
 from urdfkin.urdf.records import (
     FURTHER_LIMITS,
@@ -51,14 +51,14 @@ from urdfkin.urdf.records import (
 
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)
-DECLARED = Rule("URDF103", "declared-encoding", ERROR)
-DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
+DECLARED_ENCODING = Rule("URDF103", "declared-encoding", ERROR)
+UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
 #: UTF-32 must be tested first, because its byte order mark FF FE 00 00 begins with UTF-16's mark FF FE.
-_WIDE = {
+_WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
 }
@@ -71,19 +71,19 @@ _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
-def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
+def read_utf8(report: Reporter, data: bytes) -> bytes | None:
     """Return the UTF-8 bytes without a byte order mark; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
         report.add(EMPTY, what, remedy="check the program that wrote the file")
         return None
-    wide = next((encoding for encoding, begins in _WIDE.items() if data.startswith(begins)), None)
+    wide = next((encoding for encoding, begins in _WIDE_ENCODINGS.items() if data.startswith(begins)), None)
     if wide is not None:
         report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
     text = data.removeprefix(codecs.BOM_UTF8)
     declared = _declared_encoding(text)
-    if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
+    if not (_check_utf8(report, text, declared) and _check_declaration(report, text, declared)):
         return None
     if len(text) < len(data):
         what = "the text begins with a byte order mark"
@@ -97,7 +97,7 @@ def _declared_encoding(text: bytes) -> str | None:
     return match[1].decode("ascii", "replace") if match else None
 
 
-def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
+def _check_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     zero = text.find(b"\0")
     if zero >= 0:
         message = "the text contains a zero byte: some readers stop there, others continue"
@@ -107,7 +107,7 @@ def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     try:
         text.decode("utf-8")
     except UnicodeDecodeError as error:
-        claim = f", although the file declares {declared}" if declared else ""
+        claim = f", and the file declares {declared}" if declared else ""
         message = f"a byte is not UTF-8{claim}"
         remedy = "save the file as UTF-8"
         found = f"0x{text[error.start]:02x}"
@@ -116,28 +116,29 @@ def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     return True
 
 
-def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
+def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> bool:
     """Return whether the XML declaration is compatible with UTF-8."""
     declaration = _DECLARATION.match(text)
     version = _XML_VERSION.search(declaration[0]) if declaration else None
     if version is not None and version[1] != b"1.0":
-        found = quoted(version[1].decode())
+        found = quote(version[1].decode())
         report.add(XML_VERSION, "the XML version is not 1.0", found=found, remedy='write version="1.0"')
-    if declared is None or _codec(declared) in ("utf-8", "ascii"):
+    codec = None if declared is None else _find_codec(declared)
+    if declared is None or codec == "utf-8" or (codec == "ascii" and text.isascii()):
         return True
-    if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
+    if text.isascii() and _ASCII_SUPERSETS.match(codec or ""):
         message = "the declared encoding is not UTF-8, but every character is ASCII"
         match = _ENCODING.search(text)
         fix = None if match is None else Fix((Edit(*match.span(1), "UTF-8"),))
-        remedy, found = 'write encoding="UTF-8"', quoted(declared)
-        report.add(DECLARED_ASCII, message, found=found, remedy=remedy, fix=lambda: fix)
+        remedy, found = 'write encoding="UTF-8"', quote(declared)
+        report.add(UNUSED_DECLARED_ENCODING, message, found=found, remedy=remedy, fix=lambda: fix)
         return True
     remedy = 'save the file as UTF-8 and write encoding="UTF-8"'
-    report.add(DECLARED, "the declared encoding is not UTF-8", found=quoted(declared), remedy=remedy)
+    report.add(DECLARED_ENCODING, "the declared encoding is not UTF-8", found=quote(declared), remedy=remedy)
     return False
 
 
-def _codec(name: str) -> str | None:
+def _find_codec(name: str) -> str | None:
     """Return Python's lower-case name of an encoding; None for an unknown encoding."""
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
@@ -170,13 +171,13 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 COMMON_DEPTH = 256
 
 #: Number of bytes that expat parses in one call.
-_PIECE = 1_000_000
+_CHUNK_SIZE = 1_000_000
 
 #: If the stored text of an element has at least this many characters, the parser ignores further text.
-_STORED = 2 * QUOTED
+_MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes whose value is the name of a link or joint.
-_NAMES = frozenset({"name", "link", "joint"})
+_NAME_ATTRIBUTES = frozenset({"name", "link", "joint"})
 
 
 class _StopError(Exception):
@@ -191,7 +192,7 @@ def read_document(report: Reporter) -> Element | None:
         remedy = "if the file is correct, raise the limit with --max-bytes"
         report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {most}", remedy=remedy)
         return None
-    text = utf8_bytes(report, data)
+    text = read_utf8(report, data)
     if text is None:
         return None
     report.data = text
@@ -201,14 +202,19 @@ def read_document(report: Reporter) -> Element | None:
     except _StopError:
         return None
     except expat.ExpatError as error:
-        builder.syntax_error(error)
+        builder.report_syntax_error(error)
         return None
-    if builder.deepest > COMMON_DEPTH:
+    if builder.max_depth > COMMON_DEPTH:
         rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", COMMON_DEPTH
-        if builder.deepest > ORACLE_DEPTH:
+        if builder.max_depth > ORACLE_DEPTH:
             rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
-        what = f"elements are nested {builder.deepest} deep"
-        report.add(rule, what, builder.deepest_element, remedy=f"{reader} more than {most}")
+        what = f"elements are nested {builder.max_depth} deep"
+        report.add(
+            rule,
+            what,
+            builder.deepest_element,
+            remedy=f"remove the nesting: {reader} more than {most} levels",
+        )
     return builder.root
 
 
@@ -219,11 +225,11 @@ class _Builder:
         self.report, self.limits = report, report.limits
         self.root: Element | None = None
         self.open: list[Element] = []
-        self.begun = False
-        self.count = self.deepest = 0
+        self.has_content = False
+        self.count = self.max_depth = 0
         self.deepest_element: Element | None = None
-        self.waiting: list[Comment] = []
-        self.marked = MARK.encode() in report.data
+        self.pending_comments: list[Comment] = []
+        self.has_ignore_comment = COMMENT_MARK.encode() in report.data
         self.parser = parser = expat.ParserCreate("utf-8")
         parser.buffer_text = True
         parser.StartElementHandler = self.start
@@ -232,11 +238,11 @@ class _Builder:
         parser.StartDoctypeDeclHandler = self.doctype
         parser.CommentHandler = self.comment
         parser.ProcessingInstructionHandler = self.instruction
-        parser.SkippedEntityHandler = self.skipped
+        parser.SkippedEntityHandler = self.handle_skipped_entity
 
     def read(self, data: bytes) -> None:
         """Parse the file in pieces, and refuse a tag, comment or instruction that is too long."""
-        whole, size = memoryview(data), min(_PIECE, self.limits.markup)
+        whole, size = memoryview(data), min(_CHUNK_SIZE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
@@ -253,41 +259,41 @@ class _Builder:
         parent = self.open[-1] if self.open else None
         element = Element(tag, attributes, parent, *self.position(), self.parser.CurrentByteIndex)
         if parent is None:
-            self.root, self.begun = element, True
-            if not self.marked:
+            self.root, self.has_content = element, True
+            if not self.has_ignore_comment:
                 self.parser.CommentHandler = None
         else:
-            element.above = None if parent is self.root else parent.holder
+            element.top_ancestor = None if parent is self.root else parent.top_element
             parent.append(element)
-        for comment in self.waiting:
+        for comment in self.pending_comments:
             comment.element = element
-        self.waiting.clear()
+        self.pending_comments.clear()
         self.open.append(element)
         self.count += 1
-        if len(self.open) > self.deepest:
-            self.deepest, self.deepest_element = len(self.open), element
+        if len(self.open) > self.max_depth:
+            self.max_depth, self.deepest_element = len(self.open), element
         self.check_limits(tag, attributes)
 
     def check_limits(self, tag: str, attributes: dict[str, str]) -> None:
         most = self.limits
-        if self.deepest > most.depth:
+        if self.max_depth > most.depth:
             self.refuse(TOO_DEEP, "depth", "elements are nested too deep", f"more than {most.depth} levels")
         if self.count > most.elements:
             self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
         if len(attributes) > most.attributes:
-            found = f"{len(attributes)} in <{shortened(tag)}>, more than {most.attributes}"
+            found = f"{len(attributes)} in <{shorten(tag)}>, more than {most.attributes}"
             self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
         if len(tag) > most.name:
-            self.refuse_name("an element", tag)
+            self.refuse_name("the tag of an element", tag)
         for key, value in attributes.items():
             if len(key) > most.name:
-                self.refuse_name("an attribute", key)
-            if len(value) > most.name and key in _NAMES:
-                self.refuse_name("a link or joint", value)
+                self.refuse_name("the name of an attribute", key)
+            if len(value) > most.name and key in _NAME_ATTRIBUTES:
+                self.refuse_name(f"the {key} of <{shorten(tag)}>", value)
 
-    def refuse_name(self, owner: str, name: str) -> None:
-        found = f"{quoted(name, 30)} of {len(name)} characters, more than {self.limits.name}"
-        self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
+    def refuse_name(self, what: str, name: str) -> None:
+        found = f"{quote(name, 30)} of {len(name)} characters, more than {self.limits.name}"
+        self.refuse(NAME_TOO_LONG, "name", f"{what} is too long", found)
 
     def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
         remedy = f"if the file is correct, raise the limit with --max-{limit}"
@@ -295,63 +301,65 @@ class _Builder:
         raise _StopError
 
     def end(self, tag: str) -> None:
-        self.waiting.clear()
+        self.pending_comments.clear()
         element = self.open.pop()
         if element.text:
             element.text = element.text.strip()
 
     def characters(self, text: str) -> None:
         element = self.open[-1]
-        if len(element.text) < _STORED and not text.isspace():
-            element.text += (text if element.text else text.lstrip())[:_STORED]
+        if len(element.text) < _MAX_STORED_TEXT and not text.isspace():
+            element.text += (text if element.text else text.lstrip())[:_MAX_STORED_TEXT]
 
     def comment(self, text: str) -> None:
-        self.begun = True
-        if text.lstrip().startswith(MARK):
-            start = blanks_before(self.report.data, self.parser.CurrentByteIndex, b" \t")
-            behind = start > 0 and self.report.data[start - 1] not in b"\r\n"
-            comment = Comment(text, *self.position(), behind)
+        self.has_content = True
+        if text.lstrip().startswith(COMMENT_MARK):
+            start = start_of_blanks(self.report.data, self.parser.CurrentByteIndex, b" \t")
+            follows_text = start > 0 and self.report.data[start - 1] not in b"\r\n"
+            comment = Comment(text, *self.position(), follows_text)
             self.report.comments.append(comment)
-            self.waiting.append(comment)
+            self.pending_comments.append(comment)
 
     def instruction(self, target: str, text: str) -> None:
-        if self.begun:
+        if self.has_content:
             message = "a processing instruction is not at the beginning of the file; urdfdom refuses the file"
             remedy = "remove the instruction, or move it before every element, comment and document type"
-            found = quoted(f"<?{target} {text}".strip() + "?>")
+            found = quote(f"<?{target} {text}".strip() + "?>")
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
         """Report a document type declaration; stop if it contains or refers to definitions."""
-        self.begun = True
+        self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
             message = "a document type declaration has no use in a URDF"
-            remedy, found = "remove the declaration, which is ignored", quoted(f"<!DOCTYPE {name}>")
+            remedy, found = "remove the declaration, which is ignored", quote(f"<!DOCTYPE {name}>")
             self.report.add(DOCTYPE, message, found=found, remedy=remedy, position=position)
             return
-        what = "contains definitions" if has_subset else "refers to an external definition"
-        found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
+        what = "refers to an external definition"
+        if has_subset:
+            what = "has brackets [ ], which can contain definitions"
+        found = quote(f"<!DOCTYPE {name} [...") if system is None else quote(system)
         message = f"the document type declaration {what}"
         remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
         self.report.add(ENTITY, message, found=found, remedy=remedy, position=position)
         raise _StopError
 
-    def skipped(self, name: str, is_parameter: int) -> None:
-        self.undefined_entity(name)
+    def handle_skipped_entity(self, name: str, is_parameter: int) -> None:
+        self.report_undefined_entity(name)
         raise _StopError
 
-    def undefined_entity(self, name: str | None) -> None:
+    def report_undefined_entity(self, name: str | None) -> None:
         message = "the file uses an entity that XML does not define"
         remedy = "write the character itself, or one of &lt; &gt; &amp; &quot; &apos;"
-        found = quoted(f"&{name};") if name else None
+        found = quote(f"&{name};") if name else None
         self.report.add(ENTITY, message, found=found, remedy=remedy, position=self.position())
 
-    def syntax_error(self, error: expat.ExpatError) -> None:
+    def report_syntax_error(self, error: expat.ExpatError) -> None:
         reason = expat.errors.messages[error.code]
         if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
-            self.undefined_entity(self._entity_name())
+            self.report_undefined_entity(self._entity_name())
             return
         innermost = self.open[-1] if self.open else None
         message, remedy = _REASONS.get(reason, (reason, None))
@@ -361,7 +369,7 @@ class _Builder:
                 remedy = f"close {opened} first"
             elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
                 message, remedy = "the file ends too early", f"close {opened}"
-        found = None if reason == expat.errors.XML_ERROR_NO_ELEMENTS else self._around()
+        found = None if reason == expat.errors.XML_ERROR_NO_ELEMENTS else self._text_at_error()
         message, position = f"not well-formed XML: {message}", (error.lineno, error.offset + 1)
         self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
@@ -369,11 +377,11 @@ class _Builder:
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
-    def _around(self) -> str | None:
+    def _text_at_error(self) -> str | None:
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
-        return quoted(text) if text.strip() else None
+        return quote(text) if text.strip() else None
 
 
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
@@ -414,27 +422,31 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`."""
+    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`.
+
+    `effect` is appended to these messages.
+    """
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
     bad_vector: Rule = BAD_VECTOR
+    effect: str = ""
 
-    def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
+    def read_scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """Return a number; `default` if the attribute is missing, None if the number is invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
         if self._is_too_long(element, attribute, written, self.report.limits.number):
             return None
-        value = self._number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
+        value = self._read_number(element, attribute, _BLANKS.sub(" ", written).strip(" "))
         if value is not None and written != written.rstrip():
-            self._report_refused(element, attribute, "a space after the number")
+            self._report_refused_by_urdfdom(element, attribute, "a space after the number")
         elif value is not None and self.report.has_raw_blanks:
             self._check_raw(element, attribute, 1)
         return value
 
-    def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
+    def read_vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
         """Return `count` numbers; None if the attribute is missing or invalid."""
         written = element.attributes.get(attribute)
         if written is None:
@@ -447,13 +459,13 @@ class NumberReader:
             return None
         values: list[float] = []
         for piece in pieces:
-            value = self._number(element, attribute, piece)
+            value = self._read_number(element, attribute, piece)
             if value is None:
                 return None
             values.append(value)
         if len(values) != count:
-            message = f"{attribute} needs {count} numbers, but has {len(values)}"
-            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quoted(written)}"
+            message = f"{attribute} needs {count} numbers, but has {len(values)}{self.effect}"
+            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quote(written)}"
             self.report.add(
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
@@ -462,20 +474,20 @@ class NumberReader:
             self._check_raw(element, attribute, count)
         return tuple(values)
 
-    def _number(self, element: Element, attribute: str, piece: str) -> float | None:
+    def _read_number(self, element: Element, attribute: str, piece: str) -> float | None:
         value = float(piece) if DECIMAL.fullmatch(piece) else None
         if value is not None and math.isfinite(value):
             if value == 0.0 and re.search("[1-9]", re.split("[eE]", piece)[0]):
                 message = f"{attribute} contains a number too small for a double, which is read as zero"
-                remedy, found = "check the exponent", quoted(piece)
+                remedy, found = "check the exponent", quote(piece)
                 self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
-        what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        what = attribute if element.tag in _ELEMENTS_NOT_NAMED else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
-        message, remedy = f"{part}{what} is not a number", _remedy(piece)
+        message, remedy = f"{part}{what} is not a number{self.effect}", _remedy(piece)
         if value is not None:
-            message, remedy = f"{part}{what} is too large for a double", "check the exponent"
-        found = quoted(piece)
+            message, remedy = f"{part}{what} is too large for a double{self.effect}", "check the exponent"
+        found = quote(piece)
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
@@ -483,7 +495,7 @@ class NumberReader:
         """Report text that is too long, because converting text to a number takes quadratic time."""
         if len(written) <= most:
             return False
-        found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
+        found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
         remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
             NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,
@@ -494,15 +506,19 @@ class NumberReader:
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Report tabs and line ends between or after numbers: urdfdom refuses these characters."""
         # expat replaces tabs and line ends in attributes by spaces, so this check reads the raw text.
-        raw = self.report.raw(element, attribute)
-        if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
+        raw_value = self.report.raw_value(element, attribute)
+        if raw_value is None or self._is_too_long(
+            element, attribute, raw_value, count * self.report.limits.number
+        ):
             return
-        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
+        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw_value))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
-            self._report_refused(element, attribute, "a tab or line end between or after the numbers")
+            self._report_refused_by_urdfdom(
+                element, attribute, "a tab or line end between or after the numbers"
+            )
 
-    def _report_refused(self, element: Element, attribute: str, what: str) -> None:
+    def _report_refused_by_urdfdom(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
         rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
         if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
@@ -512,15 +528,15 @@ class NumberReader:
             message,
             element,
             attribute=attribute,
-            found=quoted(self.report.raw(element, attribute) or value),
+            found=quote(self.report.raw_value(element, attribute) or value),
             remedy="write single spaces between numbers and none around them",
-            fix=lambda: self.report.rewritten(element, attribute, " ".join(value.split())),
+            fix=lambda: self.report.make_value_fix(element, attribute, " ".join(value.split())),
         )
 
 
 #: For an attribute of these elements, a message about an invalid number names only the attribute.
 #: For other elements, the message also names the element.
-_PLAIN = ("origin", "axis", "limit")
+_ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
@@ -558,7 +574,7 @@ DUPLICATE_NAME = Rule("URDF402", "duplicate-name", ERROR)
 UNKNOWN_TYPE = Rule("URDF501", "unknown-joint-type", ERROR)
 EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
 MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
-IGNORED = Rule("URDF510", "ignored-value", WARNING)
+IGNORED_VALUE = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
 QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
@@ -566,28 +582,28 @@ BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 
 #: Newest URDF version that urdfdom 6 supports.
-NEWEST = (1, 2)
+NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
 #: The square of a length between these bounds neither underflows nor overflows.
-SHORTEST, LONGEST = 1e-150, 1e150
+MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     if root.tag != "robot":
-        _other_format(report, root)
+        _report_other_format(report, root)
         return None
-    version = _version(report, root)
+    version = _read_version(report, root)
     robot = RobotRecord(root, version)
-    for element in root.all("link"):
-        name = named(report, element)
+    for element in root.find_all("link"):
+        name = read_name(report, element)
         if name and name in robot.links:
             report_duplicate(report, element, robot.links[name])
         elif name:
             robot.links[name] = element
     reader = JointReader(report, version)
     seen: dict[str, Element] = {}
-    for element in root.all("joint"):
+    for element in root.find_all("joint"):
         joint = reader.read(element)
         if joint.name and joint.name in seen:
             report_duplicate(report, element, seen[joint.name])
@@ -610,7 +626,7 @@ _FORMATS = {
 }
 
 
-def _other_format(report: Reporter, root: Element) -> None:
+def _report_other_format(report: Reporter, root: Element) -> None:
     prefix, _, local = root.tag.rpartition(":")
     if local == "robot" and prefix:
         remedy = f"write <robot> without the prefix {prefix!r}"
@@ -621,7 +637,7 @@ def _other_format(report: Reporter, root: Element) -> None:
     report.add(NOT_URDF, "the root element is not <robot>", root, found=f"<{root.tag}>", remedy=remedy)
 
 
-def _version(report: Reporter, root: Element) -> tuple[int, int]:
+def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
     written = root.attributes.get("version")
     if written is None:
         return (1, 0)
@@ -630,7 +646,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     rule, remedy = VERSION, 'write version="1.0" if the file follows URDF 1.0, or remove the attribute'
     if version is None:
         message = "a URDF version has the form 1.0"
-    elif version > NEWEST:
+    elif version > NEWEST_VERSION:
         message = "the URDF version is later than 1.2, the last version that urdfdom and Pinocchio read"
         remedy = "write the version that the file follows, 1.0 to 1.2"
     elif version < (1, 0):
@@ -640,11 +656,11 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     else:
         rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
         remedy = "remove the attribute unless the file uses features of the version"
-    report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
+    report.add(rule, message, root, attribute="version", found=quote(written), remedy=remedy)
     return version if version is not None and rule is NEWER_VERSION else (1, 0)
 
 
-def named(report: Reporter, element: Element) -> str:
+def read_name(report: Reporter, element: Element) -> str:
     """Return the name of a link or joint; report a missing name."""
     name = element.attributes.get("name")
     if not name:
@@ -666,57 +682,59 @@ class JointReader:
         self.numbers = NumberReader(report)
 
     def read(self, element: Element) -> JointRecord:
-        joint = JointRecord(element, named(self.report, element))
-        joint.kind = self._kind(element)
-        joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
-        self._origin(joint)
-        self._axis(joint)
-        self._limit(joint)
-        self._mimic(joint)
-        self._others(joint)
+        joint = JointRecord(element, read_name(self.report, element))
+        joint.kind = self._read_kind(element)
+        joint.parent, joint.child = self._read_end(element, "parent"), self._read_end(element, "child")
+        self._read_origin(joint)
+        self._read_axis(joint)
+        self._read_limit(joint)
+        self._read_mimic(joint)
+        self._check_unused_elements(joint)
         return joint
 
-    def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
+    def read_required(
+        self, element: Element, attribute: str, example: str, *, number: bool = False
+    ) -> str | None:
         """Return a required attribute; report a missing value, and an empty value if `number` is False."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
             message = f"<{element.tag}> needs the attribute {attribute}{empty}"
-            found, remedy = quoted(element.text) if element.text else None, f"write {example}"
+            found, remedy = quote(element.text) if element.text else None, f"write {example}"
             self.report.add(
                 MISSING_ATTRIBUTE, message, element, attribute=attribute, found=found, remedy=remedy
             )
         return value or None
 
-    def _kind(self, element: Element) -> str | None:
-        written = self.required(element, "type", '<joint name="..." type="revolute">')
+    def _read_kind(self, element: Element) -> str | None:
+        written = self.read_required(element, "type", '<joint name="..." type="revolute">')
         if written is None or written in JOINT_TYPES:
             return written
         close = nearest_tag(written, frozenset(JOINT_TYPES))
         message = "unknown joint type"
         remedy = f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}"
-        found = quoted(written)
+        found = quote(written)
         self.report.add(UNKNOWN_TYPE, message, element, attribute="type", found=found, remedy=remedy)
         return None
 
-    def _end(self, element: Element, tag: str) -> str | None:
+    def _read_end(self, element: Element, tag: str) -> str | None:
         example = f'<{tag} link="..."/>'
-        if (end := element.first(tag)) is None:
+        if (end := element.find(tag)) is None:
             self.report.add(MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f"write {example}")
             return None
-        return self.required(end, "link", example)
+        return self.read_required(end, "link", example)
 
-    def _origin(self, joint: JointRecord) -> None:
-        origin = joint.origin_element = joint.element.first("origin")
+    def _read_origin(self, joint: JointRecord) -> None:
+        origin = joint.origin_element = joint.element.find("origin")
         if origin is None:
             return
-        joint.xyz = self.numbers.vector(origin, "xyz") or joint.xyz
-        joint.rpy = self.numbers.vector(origin, "rpy") or joint.rpy
+        joint.xyz = self.numbers.read_vector(origin, "xyz") or joint.xyz
+        joint.rpy = self.numbers.read_vector(origin, "rpy") or joint.rpy
         if "quat_xyzw" in origin.attributes:
-            self._quaternion(joint, origin)
+            self._read_quaternion(joint, origin)
 
-    def _quaternion(self, joint: JointRecord, origin: Element) -> None:
-        found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
+    def _read_quaternion(self, joint: JointRecord, origin: Element) -> None:
+        found = f"quat_xyzw={quote(origin.attributes['quat_xyzw'])}"
 
         def add(rule: Rule, message: str, remedy: str) -> None:
             self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
@@ -725,28 +743,33 @@ class JointReader:
             message = 'quat_xyzw needs version="1.1" and is ignored'
             add(QUATERNION_IGNORED, message, "write the rotation as rpy")
             return
-        quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
+        quaternion = self.numbers.read_vector(origin, "quat_xyzw", 4)
         if quaternion is None:
             return
-        both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
+        both, zero = (
+            "rpy" in origin.attributes,
+            not MIN_VECTOR_LENGTH < sum(map(abs, quaternion)) < MAX_VECTOR_LENGTH,
+        )
         if both:
             add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of these attributes")
         elif zero:
-            add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
+            what = "has no usable length" if any(quaternion) else "is zero"
+            add(BAD_QUATERNION, f"the quaternion {what}", 'the identity is "0 0 0 1"')
         else:
             joint.quaternion = quaternion
             message = "urdfkin uses quat_xyzw, but most readers ignore this rotation"
             add(QUATERNION, message, "write the rotation as rpy for these readers")
 
-    def _axis(self, joint: JointRecord) -> None:
-        axis = joint.axis_element = joint.element.first("axis")
+    def _read_axis(self, joint: JointRecord) -> None:
+        axis = joint.axis_element = joint.element.find("axis")
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
-            NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
+            effect = f"; a {joint.kind} joint ignores its axis"
+            NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE, effect).read_vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
-            joint.axis = self.numbers.vector(axis, "xyz")
+            joint.axis = self.numbers.read_vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # Rule URDF212 reports text between tags.
@@ -756,8 +779,8 @@ class JointReader:
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
-    def _limit(self, joint: JointRecord) -> None:
-        limit = joint.element.first("limit")
+    def _read_limit(self, joint: JointRecord) -> None:
+        limit = joint.element.find("limit")
         bounded = joint.kind in ("revolute", "prismatic")
         if limit is None:
             if bounded:
@@ -769,33 +792,33 @@ class JointReader:
             return
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
-            self.required(limit, attribute, _EXAMPLE_LIMIT, number=True)
+            self.read_required(limit, attribute, _EXAMPLE_LIMIT, number=True)
         names = ("lower", "upper", "effort", "velocity", *(FURTHER_LIMITS if self.version >= (1, 2) else ()))
-        values = {name: self.numbers.scalar(limit, name) for name in names}
+        values = {name: self.numbers.read_scalar(limit, name) for name in names}
         joint.limit = LimitRecord(limit, **values)
 
-    def _mimic(self, joint: JointRecord) -> None:
-        mimic = joint.element.first("mimic")
+    def _read_mimic(self, joint: JointRecord) -> None:
+        mimic = joint.element.find("mimic")
         if mimic is None:
             return
-        leader = self.required(mimic, "joint", '<mimic joint="..."/>')
-        multiplier = self.numbers.scalar(mimic, "multiplier", 1.0)
-        offset = self.numbers.scalar(mimic, "offset", 0.0)
+        leader = self.read_required(mimic, "joint", '<mimic joint="..."/>')
+        multiplier = self.numbers.read_scalar(mimic, "multiplier", 1.0)
+        offset = self.numbers.read_scalar(mimic, "offset", 0.0)
         if leader is not None and multiplier is not None and offset is not None:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
-    def _others(self, joint: JointRecord) -> None:
+    def _check_unused_elements(self, joint: JointRecord) -> None:
         """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
-        dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
+        dynamics, safety = (joint.element.find(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
-            self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
+            self.read_required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
         if safety is not None:
             example = '<safety_controller k_velocity="0"/>, or remove <safety_controller>'
-            self.required(safety, "k_velocity", example, number=True)
+            self.read_required(safety, "k_velocity", example, number=True)
         for tag, attributes in _UNUSED_NUMBERS.items():
-            if (element := joint.element.first(tag)) is not None:
+            if (element := joint.element.find(tag)) is not None:
                 for attribute in attributes:
-                    self.numbers.scalar(element, attribute)
+                    self.numbers.read_scalar(element, attribute)
 
 
 _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
@@ -810,7 +833,7 @@ _UNUSED_NUMBERS = {
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     # A name in the file may have megabytes, and the cache must not store such a name.
-    return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
+    return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
 
 @lru_cache(1024)
@@ -824,4 +847,4 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
 
 
 #: A word with more characters is not similar to any tag or attribute of URDF.
-_LONGEST_WORD = 32
+_MAX_WORD_LENGTH = 32

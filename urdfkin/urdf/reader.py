@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_from_quaternion, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -25,22 +25,24 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
     """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors."""
     name = urdf.element.attributes.get("name", "")
-    tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
+    tree = build_tree(
+        name, find_root_link(name, urdf.links, urdf.joints), make_joint_rows(urdf.joints, mimic=mimic)
+    )
     if root_joint not in (None, "floating", "planar"):
         raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))
     return tree if root_joint is None else with_root_joint(tree, JointKind(root_joint))
 
 
-def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
+def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with its parent link and its child link.
 
-    Raise InputError if mimic joints form a circle, and UnknownNameError if a mimicked joint does not exist.
+    Raise InputError if mimic joints form a cycle, and UnknownNameError if a mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
-    return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
+    return [(_make_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
 
 
-def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
+def find_root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
     """Return the link without a parent; raise InputError unless there is exactly one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
@@ -49,7 +51,7 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
     return roots.pop()
 
 
-def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
+def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
@@ -62,8 +64,8 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
         kind=kind,
         parent=0,
         T_parent_joint=T,
-        axis=_unit(np.array(joint.axis), joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
-        limit=_limit(joint.limit, kind),
+        axis=_normalize(np.array(joint.axis), joint.name) if kind.has_axis else np.array([1.0, 0.0, 0.0]),
+        limit=_make_limit(joint.limit, kind),
         mimic=rule,
     )
 
@@ -71,10 +73,10 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
     """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
-    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
+    return rpy_of(rotation_from_quaternion(scaled / np.linalg.norm(scaled)))
 
 
-def _unit(axis: FloatArray, joint: str) -> FloatArray:
+def _normalize(axis: FloatArray, joint: str) -> FloatArray:
     """Divide an axis by its length, as Pinocchio does."""
     length = math.hypot(*axis)
     if not 0.0 < length < math.inf:
@@ -82,14 +84,14 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
     return axis if length == 1.0 else axis / length
 
 
-def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
+def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
     # In urdfdom, the default of a position limit is zero.
     # In the URDF specification, position limits of a continuous joint have no effect.
     return Limit(
-        lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
-        upper=(limit.upper or 0.0) if kind.bounded else math.inf,
+        lower=(limit.lower or 0.0) if kind.has_limits else -math.inf,
+        upper=(limit.upper or 0.0) if kind.has_limits else math.inf,
         velocity=math.inf if limit.velocity is None else limit.velocity,
         effort=math.inf if limit.effort is None else limit.effort,
     )
@@ -113,7 +115,7 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
                 where = f"joint {name} (mimic=False, --no-mimic, lets the joint move freely)"
                 raise UnknownNameError("mimicked joint", str(rule.leader), names, where=where)
             if rule.leader in pending:
-                raise InputError("mimic joints follow each other in a circle", where=f"joint {start}")
+                raise InputError("mimic joints follow each other in a cycle", where=f"joint {start}")
             name = rule.leader
         end = resolved.get(name, Mimic(name, 1.0, 0.0))
         for name, rule in reversed(pending.items()):

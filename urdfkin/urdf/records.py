@@ -16,7 +16,7 @@ ORACLE_DEPTH = 498
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class SizeLimits:
     """Limits on the size of a URDF file and its content.
 
     Attributes:
@@ -38,7 +38,7 @@ class Limits:
     markup: int = 10_000_000
 
 
-DEFAULT_LIMITS = Limits()
+DEFAULT_SIZE_LIMITS = SizeLimits()
 
 
 #: A quoted attribute value in a start tag may contain '>'.
@@ -52,7 +52,7 @@ class Element:
 
     Attributes:
         offset: Index of the start tag's first byte, without counting a byte order mark.
-        above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
+        top_ancestor: The child of `<robot>` that contains this element; None for the children of `<robot>`.
         text: The first characters of the text between the element's tags.
     """
 
@@ -62,7 +62,7 @@ class Element:
     line: int
     column: int
     offset: int
-    above: Element | None = None
+    top_ancestor: Element | None = None
     children: Sequence[Element] = ()
     text: str = ""
 
@@ -73,10 +73,10 @@ class Element:
         else:
             self.children = [child]
 
-    def all(self, tag: str) -> list[Element]:
+    def find_all(self, tag: str) -> list[Element]:
         return [child for child in self.children if child.tag == tag]
 
-    def first(self, tag: str) -> Element | None:
+    def find(self, tag: str) -> Element | None:
         """Return the first child with a tag; URDF readers ignore further children with this tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
@@ -88,12 +88,12 @@ class Element:
             stack += reversed(element.children)
 
     @property
-    def holder(self) -> Element:
+    def top_element(self) -> Element:
         """The child of `<robot>` that contains this element.
 
-        For `<robot>` and its children, `holder` is the element itself.
+        For `<robot>` and its children, `top_element` is the element itself.
         """
-        return self.above or self
+        return self.top_ancestor or self
 
 
 Vector = tuple[float, ...]
@@ -101,7 +101,7 @@ Vector = tuple[float, ...]
 #: Attributes of `<limit>` that URDF 1.2 introduced.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
-AXIAL = ("revolute", "continuous", "prismatic")
+AXIAL_TYPES = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(slots=True)
@@ -151,7 +151,7 @@ class RobotRecord:
     joints: list[JointRecord] = field(default_factory=list)
 
     @property
-    def by_name(self) -> dict[str, JointRecord]:
+    def joints_by_name(self) -> dict[str, JointRecord]:
         first: dict[str, JointRecord] = {}
         for joint in self.joints:
             first.setdefault(joint.name, joint)

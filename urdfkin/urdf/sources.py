@@ -16,9 +16,9 @@ from typing import IO, TypeGuard
 from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, nearest
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
-from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
+from urdfkin.urdf.catalogue import CatalogueEntry, catalogue, find_package, split_uri
 
-USD = (".usd", ".usda", ".usdc", ".usdz")
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,19 +51,19 @@ class Origin:
             as_str(self.root_joint, "root_joint")
 
     @property
-    def again(self) -> str:
+    def source_argument(self) -> str:
         """The source for a new call of `load`; `-` (standard input) for a source without a name."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
-    def options(self) -> str:
+    def command_line_options(self) -> str:
         """The options as written on a command line.
 
-        >>> Origin("arm.xacro", mimic=False, xacro_args=(("arm", "left one"),)).options
+        >>> Origin("arm.xacro", mimic=False, xacro_args=(("arm", "left one"),)).command_line_options
         "--xacro-arg 'arm:=left one' --no-mimic"
         """
         words = [f"--xacro-arg {shlex.quote(f'{name}:={value}')}" for name, value in self.xacro_args]
-        words += [f"--variant {shlex.quote(f'{name}={one}')}" for name, one in self.variants]
+        words += [f"--variant {shlex.quote(f'{name}={variant}')}" for name, variant in self.variants]
         if self.articulation is not None:
             words.append(f"--articulation {shlex.quote(self.articulation)}")
         if self.mimic is not None:
@@ -76,31 +76,31 @@ class Origin:
         return " ".join(words)
 
     @property
-    def words(self) -> str:
+    def command_line(self) -> str:
         """The source and the options as written on a command line.
 
-        >>> Origin("my arm.urdf", root_joint="floating").words
+        >>> Origin("my arm.urdf", root_joint="floating").command_line
         "'my arm.urdf' --root-joint floating"
-        >>> Origin("<text>").words
+        >>> Origin("<text>").command_line
         '-'
         """
-        return " ".join(filter(None, (shlex.quote(self.again), self.options)))
+        return " ".join(filter(None, (shlex.quote(self.source_argument), self.command_line_options)))
 
     @property
-    def lock_words(self) -> str:
+    def locks_text(self) -> str:
         """The locked joints in words; an empty string if there are none.
 
-        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
+        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).locks_text
         'finger locked at 0.04, wrist at 0'
         """
         locks = enumerate(self.lock)
         return ", ".join(f"{name}{'' if i else ' locked'} at {value:.6g}" for i, (name, value) in locks)
 
     @property
-    def python(self) -> str:
+    def python_call(self) -> str:
         """The call of `load` in Python.
 
-        >>> Origin("panda", mimic=False).python
+        >>> Origin("panda", mimic=False).python_call
         "urdfkin.load('panda', mimic=False)"
         """
         values = {
@@ -113,7 +113,7 @@ class Origin:
             "articulation": self.articulation,
         }
         arguments = [f"{name}={value!r}" for name, value in values.items() if value is not None]
-        return f"urdfkin.load({', '.join([repr(self.again), *arguments])})"
+        return f"urdfkin.load({', '.join([repr(self.source_argument), *arguments])})"
 
 
 #: Types of sources for `load` and `check`.
@@ -121,7 +121,7 @@ Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class UrdfText:
     """The bytes of a URDF, and information about their source.
 
     Attributes:
@@ -134,19 +134,21 @@ class Text:
     data: bytes
     label: str
     source: str
-    entry: Entry | None = None
+    entry: CatalogueEntry | None = None
     xacro_args: tuple[tuple[str, str], ...] = ()
     sha256: str = ""
     variants: tuple[tuple[str, str], ...] = ()
     articulation: str | None = None
 
 
-def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
+def read_source(
+    source: Source, max_bytes: int = MOST, xacro_args: Mapping[str, object] | None = None
+) -> UrdfText:
     """Read a URDF from any source.
 
-    Read at most `most` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
-    `most` + 1 characters of an open text file. The additional byte or character shows that the file is too
-    long.
+    Read at most `max_bytes` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
+    `max_bytes` + 1 characters of an open text file. The additional byte or character shows that the file is
+    too long.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`. Raise
     SourceError for an unreadable file, UnknownNameError for an unknown name, and InputError for a wrong type.
@@ -154,21 +156,21 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
-        source = _in_package(*address)
+        source = _resolve_package_uri(*address)
     if is_xacro(source):
         return _expand_xacro(at_home(source), xacro_args or {})
     if xacro_args:
         names = ", ".join(map(str, xacro_args))
         raise InputError("`xacro_args` needs the path of a .xacro file", found=names)
     if isinstance(source, bytes):
-        return Text(source, "<bytes>", "<bytes>")
+        return UrdfText(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
-        return _read_file(Path(source), most)
+        return _read_file(Path(source), max_bytes)
     if isinstance(source, str):
-        return _read_string(source, most)
+        return _read_string(source, max_bytes)
     if hasattr(source, "read"):
         label = str(getattr(source, "name", "<file>"))
-        return _encode(source.read(most + 1), label, label)
+        return _encode(source.read(max_bytes + 1), label, label)
     raise InputError(
         "the source must be a path, a catalogue name, URDF text, bytes or an open file",
         found=type(source).__name__,
@@ -189,7 +191,7 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
     >>> is_usd("arm.usda"), is_usd("arm.USDZ"), is_usd("arm.urdf"), is_usd("<robot/>")
     (True, True, False, False)
     """
-    return _suffix(source) in USD
+    return _suffix(source) in USD_SUFFIXES
 
 
 def _suffix(source: object) -> str:
@@ -199,31 +201,33 @@ def _suffix(source: object) -> str:
     return "" if is_text else Path(source).suffix.lower()
 
 
-def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
+def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> UrdfText:
     from urdfkin.urdf.xacro import expand
 
     words = {name: str(value) for name, value in arguments.items()}
-    return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
+    return UrdfText(
+        expand(path, words), f"{path} (expanded)", unambiguous_path(path), xacro_args=tuple(words.items())
+    )
 
 
-def _read_string(word: str, most: int) -> Text:
-    if not word.strip():
+def _read_string(source: str, max_bytes: int) -> UrdfText:
+    if not source.strip():
         remedy = "a path, a name that 'urdfkin robots' lists, or '-'"
-        raise InputError("the robot's name is empty", found=repr(word), remedy=remedy)
-    if word == "-":
-        return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
-    if word.lstrip("\ufeff \t\r\n").startswith("<"):
-        return _encode(word, "<text>", "<text>")
-    if (entry := entry_of(word)) is not None:
-        read = _read_file(entry.path, most)
-        return Text(read.data, read.label, word, entry)
-    path = at_home(word)
-    if os.sep in word or path.suffix or exists(path):
-        return _read_file(path, most)
-    raise UnknownNameError("robot", word, catalogue(), where="neither a file nor in the catalogue")
+        raise InputError("the robot's name is empty", found=repr(source), remedy=remedy)
+    if source == "-":
+        return UrdfText(read_start_of_standard_input(max_bytes + 1), "<stdin>", "-")
+    if source.lstrip("\ufeff \t\r\n").startswith("<"):
+        return _encode(source, "<text>", "<text>")
+    if (entry := find_entry(source)) is not None:
+        read = _read_file(entry.path, max_bytes)
+        return UrdfText(read.data, read.label, source, entry)
+    path = at_home(source)
+    if os.sep in source or path.suffix or exists(path):
+        return _read_file(path, max_bytes)
+    raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
 
 
-def _in_package(name: str, path: str) -> Path:
+def _resolve_package_uri(name: str, path: str) -> Path:
     """Return the file of a `package://` address; raise SourceError for an unknown package."""
     # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
@@ -237,15 +241,15 @@ def _in_package(name: str, path: str) -> Path:
     return folder / path
 
 
-def _encode(content: str | bytes, label: str, source: str) -> Text:
+def _encode(content: str | bytes, label: str, source: str) -> UrdfText:
     # `encode` must accept a lone surrogate, because the later check of the bytes reports it.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
-    return Text(data, label, source)
+    return UrdfText(data, label, source)
 
 
-def _read_file(path: Path, most: int) -> Text:
+def _read_file(path: Path, max_bytes: int) -> UrdfText:
     try:
-        return Text(read_start(path, most + 1, pipes=True), str(path), as_word(path))
+        return UrdfText(read_start(path, max_bytes + 1, pipes=True), str(path), unambiguous_path(path))
     except SourceError as error:
         if isinstance(error.__cause__, FileNotFoundError):
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
@@ -255,18 +259,18 @@ def _read_file(path: Path, most: int) -> Text:
         raise
 
 
-def as_word(path: Path) -> str:
+def unambiguous_path(path: Path) -> str:
     """Return a path that cannot be mistaken for an option, URDF text or a catalogue name."""
     word = str(path)
-    return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
+    return f"./{word}" if word.startswith(("-", "<")) or find_entry(word) is not None else word
 
 
-def entry_of(word: str) -> Entry | None:
+def find_entry(name: str) -> CatalogueEntry | None:
     """Return the catalogue entry of a name, or None.
 
     A text with a dot or a path separator is a path, not a name.
     """
-    return None if "." in word or os.sep in word else catalogue().get(word)
+    return None if "." in name or os.sep in name else catalogue().get(name)
 
 
 def _nearest_file(path: Path) -> str:

@@ -10,8 +10,8 @@
   robot is rotated, so that z is up.
 - Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
-A stage consists of files, called layers. Before OpenUSD combines the layers, `files_of` reads each layer
-separately. The function refuses a reference to a network address, and a reference to a file outside the
+A stage consists of files, called layers. Before OpenUSD combines the layers, `find_layer_files` reads each
+layer separately. The function refuses a reference to a network address, and a reference to a file outside the
 robot's folder, package and repository.
 """
 
@@ -31,10 +31,10 @@ from typing import Any, Literal
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.rotation import quaternion_of, rotation_from_quaternion
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -47,15 +47,15 @@ from urdfkin.model.tree import (
 )
 from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
-from urdfkin.urdf.confinement import Ground
-from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, leads, resolve, unique
-from urdfkin.urdf.sources import USD
+from urdfkin.urdf.confinement import AllowedPaths
+from urdfkin.urdf.mjcf import SLIDE_LIMIT, depends_on, make_fixed_joint, make_unique, resolve_rule
+from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
-_LAYERS = 1_000
+_MAX_LAYERS = 1_000
 #: A missing limit of a joint is written as infinity or as this largest number in single precision.
-_LARGEST = float(np.finfo(np.float32).max)
-#: A frame has shear if the cosine between two of its axes exceeds the product `_SHEAR` u n.
+_LARGEST_SINGLE = float(np.finfo(np.float32).max)
+#: A frame has shear if the cosine between two of its axes exceeds the product `_MAX_SHEAR` u n.
 #: In this product, n is the number of prims on the path of the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has a rounding error of at most u.
@@ -63,64 +63,64 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by at most u.
 #: The cosine between two axes then changes by at most 4 u.
-_SHEAR = 14.0
+_MAX_SHEAR = 14.0
 #: A joint with limits up to this angle (degrees) hardly moves.
 #: urdfkin does not report that such limits are probably in radians.
-_SMALLEST_ANGLE = 0.01
+_NEGLIGIBLE_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
-_LFS = b"version https://git-lfs.github.com/spec/"
-_MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+_MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
-_MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
+_MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: Words in the names of USD types and schemas that couple joints or bodies.
-_COUPLINGS = ("Mimic", "Equality", "Tendon")
+_COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
-_NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
+_UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Coefficients of the nonlinear terms of a MuJoCo joint equality; a mimic rule is linear.
-_HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
-_AXES = {"X": 0, "Y": 1, "Z": 2}
+_NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
+_AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
-_SHAPES = ("visual", "visuals", "collision", "collisions")
+_SHAPE_GROUPS = ("visual", "visuals", "collision", "collisions")
 #: Rotation matrix that rotates the y axis onto the z axis.
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 #: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
-Kind = Literal[
+RemarkKind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class Remark:
+class UsdRemark:
     """A part of the stage that the tree does not represent, or a probable mistake."""
 
-    kind: Kind
+    kind: RemarkKind
     where: str
     what: str
     remedy: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class JointReading:
+class UsdJoint:
     """The values of a joint prim, before the conversion to z up.
 
     The fields `body1`, `p1` and `quat1` describe the second body.
 
     Attributes:
-        free: The directions in which the joint moves, such as `rotZ`.
+        directions: The directions in which the joint moves, such as `rotZ`.
         body0: Path of the first body; empty for the world.
         p0: (3,) origin of the joint frame in the first body, m.
         quat0: (4,) unit quaternion of the joint frame in the first body, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`. Error bounds
-            depend on this sum.
+        length_sum: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`. Error
+            bounds depend on this sum.
     """
 
-    free: str
+    directions: str
     body0: str
     body1: str
     p0: FloatArray
@@ -128,7 +128,7 @@ class JointReading:
     p1: FloatArray
     quat1: FloatArray
     limits: tuple[float, float]
-    size: float
+    length_sum: float
 
     def as_list(self) -> list[Any]:
         return [one.tolist() if isinstance(one, np.ndarray) else one for one in astuple(self)]
@@ -140,11 +140,11 @@ class Usd:
 
     Attributes:
         prims: Path of the prim, by link name. A link without a prim has no entry.
-        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
-        rest_q: (nq,) configuration of the robot in the poses `rest`. Planar and floating joints are in their
-            zero configuration instead.
-        single: Five numbers for each joint, by joint name. The numbers bound the effect of rounding to single
-            precision:
+        rest_poses: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
+        rest_q: (nq,) configuration of the robot in the poses `rest_poses`. Planar and floating joints are in
+            their zero configuration instead.
+        single_precision: Five numbers for each joint, by joint name. The numbers bound the effect of rounding
+            to single precision:
 
             1. a bound on the error (m) of the joint origins,
             2. a bound on the error (rad) of the joint orientations,
@@ -152,18 +152,18 @@ class Usd:
             4. a bound on the relative error of a mimic joint's value, or 0 for other joints,
             5. the distance (m) between the joint frame and the child frame.
         joints: The values of each joint prim in the tree, by the path of the prim.
-        unit: The stage's metersPerUnit.
+        meters_per_unit: The stage's metersPerUnit.
     """
 
     tree: KinematicTree
     prims: dict[str, str]
-    rest: FloatArray
+    rest_poses: FloatArray
     rest_q: FloatArray
-    single: dict[str, tuple[float, float, float, float, float]]
-    joints: dict[str, JointReading]
+    single_precision: dict[str, tuple[float, float, float, float, float]]
+    joints: dict[str, UsdJoint]
     stage: Any
-    unit: float
-    remarks: tuple[Remark, ...]
+    meters_per_unit: float
+    remarks: tuple[UsdRemark, ...]
     files: tuple[str, ...]
 
 
@@ -174,7 +174,7 @@ def version() -> str:
     return found
 
 
-def library() -> Any:
+def import_openusd() -> Any:
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
@@ -182,16 +182,16 @@ def library() -> Any:
     return SimpleNamespace(Ar=Ar, Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdPhysics=UsdPhysics)
 
 
-def files_of(pxr: Any, path: str) -> tuple[str, ...]:
+def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage; check each layer before OpenUSD follows its references."""
-    ground = Ground.around(Path(path), [], [])
+    allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
     files: dict[str, None] = {}
     while open_:
         identifier, where = open_.popleft()
         outer = pxr.Ar.SplitPackageRelativePathOuter(identifier)[0]
         if outer not in files:
-            if read_start(Path(outer), len(_LFS)) == _LFS:
+            if read_start(Path(outer), len(_LFS_POINTER)) == _LFS_POINTER:
                 what = "this file is a pointer of Git LFS, not USD"
                 raise InputError(what, where=outer, remedy="run git lfs pull")
             size = Path(outer).stat().st_size
@@ -208,12 +208,12 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
             raise InputError("OpenUSD does not accept this file", where=identifier)
         _refuse_clips(pxr, layer, identifier)
         for asset in layer.GetCompositionAssetDependencies():
-            address = _address(pxr, layer, asset, ground, identifier)
+            address = _resolve_asset(pxr, layer, asset, allowed_paths, identifier)
             if address is None or address in known:
                 continue
             known.add(address)
-            if len(known) > _LAYERS:
-                raise InputError("this stage has too many layers", where=path, found=f"over {_LAYERS}")
+            if len(known) > _MAX_LAYERS:
+                raise InputError("this stage has too many layers", where=path, found=f"over {_MAX_LAYERS}")
             open_.append((address, identifier))
     return tuple(files)
 
@@ -222,26 +222,26 @@ def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
     """Refuse value clips, because OpenUSD does not list their files as dependencies of a layer."""
     found: list[str] = []
 
-    def look(path: Any) -> None:
+    def visit(path: Any) -> None:
         if path.IsPrimPath() or path.IsPrimVariantSelectionPath():
             spec = layer.GetObjectAtPath(path)
             if spec is not None and any(spec.HasInfo(key) for key in ("clips", "clipSets")):
                 found.append(str(path))
 
-    layer.Traverse(pxr.Sdf.Path.absoluteRootPath, look)
+    layer.Traverse(pxr.Sdf.Path.absoluteRootPath, visit)
     if found:
-        raise _refused("a prim has value clips, which urdfkin does not read", where, found[0])
+        raise _make_refusal("a prim has value clips, which urdfkin does not read", where, found[0])
 
 
-def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> str | None:
+def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths, where: str) -> str | None:
     """Return the path of an asset, or None for a missing file; refuse a forbidden reference."""
     written = asset.partition(":SDF_FORMAT_ARGS:")[0]
     if not written:
         return None
     if written.startswith("`"):
-        raise _refused("a reference is an expression", where, written)
+        raise _make_refusal("a reference is an expression", where, written)
     if "://" in written:
-        raise _refused("a reference is a network address, and urdfkin downloads nothing", where, written)
+        raise _make_refusal("a reference is a network address, and urdfkin downloads nothing", where, written)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
@@ -249,15 +249,15 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
-    if not ground.holds(outer):
+    if not allowed_paths.allows(outer):
         what = "a reference leads outside the folder, package and repository of the stage"
-        raise _refused(what, where, written)
-    if Path(inner or outer).suffix.lower() not in USD:
-        raise _refused("a reference names a file that is not USD", where, written)
+        raise _make_refusal(what, where, written)
+    if Path(inner or outer).suffix.lower() not in USD_SUFFIXES:
+        raise _make_refusal("a reference names a file that is not USD", where, written)
     return address if os.path.exists(outer) else None  # noqa: PTH110  Path.exists() can fail
 
 
-def _refused(what: str, where: str, found: str) -> InputError:
+def _make_refusal(what: str, where: str, found: str) -> InputError:
     remedy = "copy the file beside the stage, or flatten the stage: usdcat --flatten"
     return InputError(what, where=where, found=found[:200], remedy=remedy)
 
@@ -270,29 +270,29 @@ def read_usd(
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
     that has the variant set. `articulation` is the path or name of the articulation to read.
     """
-    pxr = library()
+    pxr = import_openusd()
     try:
-        files = files_of(pxr, path)
+        files = find_layer_files(pxr, path)
         stage = pxr.Usd.Stage.Open(path)
-        opened = _select(pxr, stage, variants, name)
+        expanded_instances = _select_variants(pxr, stage, variants, name)
         layers = [layer.realPath.partition("[")[0] for layer in stage.GetUsedLayers() if layer.realPath]
         if more := sorted(set(map(os.path.realpath, layers)) - set(map(os.path.realpath, files))):
-            raise _refused("the stage uses a file that no layer of the stage refers to", name, more[0])
-        return _StageReader(pxr, stage, name, opened).read(articulation, files)
+            raise _make_refusal("the stage uses a file that no layer of the stage refers to", name, more[0])
+        return _StageReader(pxr, stage, name, expanded_instances).read(articulation, files)
     except pxr.Tf.ErrorException as error:
         words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
         found = " ".join(words.split())[:300]
         raise InputError("OpenUSD does not accept this file", where=name, found=found) from None
 
 
-def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
+def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, which is not saved; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
     function expands the instance: the instance becomes an ordinary prim.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
-    opened = set[str]()
+    expanded_instances = set[str]()
     for word, variant in variants:
         sets = _variant_sets(pxr, stage)
         while inside := [prim for prim in sets.get(word, []) if prim.IsInstanceProxy()]:
@@ -301,7 +301,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
                 while outer.IsInstanceProxy():
                     outer = outer.GetParent()
                 outer.SetInstanceable(False)
-                opened.add(str(outer.GetPath()))
+                expanded_instances.add(str(outer.GetPath()))
             sets = _variant_sets(pxr, stage)
         if word not in sets:
             raise UnknownNameError("variant set", word, list(sets), where=name)
@@ -311,7 +311,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
             raise UnknownNameError("variant", variant, own[0].GetVariantNames(), where=f"{name}: {word}")
         for one in known:
             one.SetVariantSelection(variant)
-    return frozenset(opened)
+    return frozenset(expanded_instances)
 
 
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
@@ -330,14 +330,14 @@ class _Body:
 
 
 @dataclass(slots=True)
-class _Edge:
+class _JointPrim:
     """A joint prim.
 
     Attributes:
         name: At first the name of the prim; later the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in the two bodies.
-        rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
+        rounding: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
     prim: Any
@@ -348,15 +348,15 @@ class _Edge:
     ends: tuple[str | None, str | None]
     frames: tuple[FloatArray, FloatArray]
     limits: tuple[float, float]
-    size: float
-    rounded: tuple[float, float]
+    length_sum: float
+    rounding: tuple[float, float]
 
 
 @dataclass(slots=True)
 class _Articulation:
     path: str
     bodies: list[str]
-    edges: list[_Edge]
+    edges: list[_JointPrim]
 
 
 @dataclass(slots=True)
@@ -365,61 +365,70 @@ class _StageReader:
 
     Attributes:
         source: Name of the stage in messages.
-        opened: Paths of the instances that `_select` expanded.
+        expanded_instances: Paths of the instances that `_select_variants` expanded.
     """
 
     pxr: Any
     stage: Any
     source: str
-    opened: frozenset[str]
-    remarks: list[Remark] = field(default_factory=list)
+    expanded_instances: frozenset[str]
+    remarks: list[UsdRemark] = field(default_factory=list)
     _bodies: dict[str, _Body] = field(default_factory=dict)
-    _edges: list[_Edge] = field(default_factory=list)
-    _read: dict[str, JointReading] = field(default_factory=dict)
-    _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
+    _edges: list[_JointPrim] = field(default_factory=list)
+    _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
+    _single_precision: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
     # Pinocchio uses the name `universe` for the world and `root_joint` for the joint of a moving base.
     _link_names: set[str] = field(default_factory=lambda: {"universe"})
     _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
-    _unit: float = 1.0
+    _meters_per_unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
     _instancers: list[str] = field(default_factory=list)
-    _looked_at: set[str] = field(default_factory=set)
+    _checked_paths: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
         pxr, stage = self.pxr, self.stage
-        self._unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
-        if not (math.isfinite(self._unit) and self._unit > 0.0):
+        self._meters_per_unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
+        if not (math.isfinite(self._meters_per_unit) and self._meters_per_unit > 0.0):
             what = "metersPerUnit must be a positive number"
-            raise InputError(what, where=self.source, found=f"{self._unit:g}")
+            raise InputError(what, where=self.source, found=f"{self._meters_per_unit:g}")
         if pxr.UsdGeom.GetStageUpAxis(stage) == "Y":
-            self._up = _Y_UP
+            self._up = _ROTATION_OF_Y_UP
         self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
         for error in stage.GetCompositionErrors():
             words = " ".join(str(error).split())[:300]
             self._report("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
-        prims = self._prims()
-        self._collect(prims)
-        found = self._articulations()
-        chosen = self._choose(found, articulation)
-        tree, links = self._tree(chosen)
-        self._report_loose_bodies(chosen, found)
-        rest = np.array([self._placed(stage.GetPrimAtPath(path))[0] for path in links.values()])
-        rest_q = self._rest(tree, chosen, links, rest)
+        prims = self._find_prims()
+        self._read_bodies_and_joints(prims)
+        articulations = self._find_articulations()
+        chosen = self._choose_articulation(articulations, articulation)
+        tree, links = self._make_tree(chosen)
+        self._report_loose_bodies(chosen, articulations)
+        rest = np.array([self._world_pose(stage.GetPrimAtPath(path))[0] for path in links.values()])
+        rest_q = self._find_rest_configuration(tree, chosen, links, rest)
         self._report_unit_and_up_axis(rest)
-        self._report_layers([*links.values(), *self._read])
+        self._report_layers([*links.values(), *self._joints_read])
         if count := sum(prim.IsA(pxr.UsdGeom.Gprim) for prim in prims):
             self._report("unused-in-usd", "", f"kinematics does not use the {count} shapes")
         return Usd(
-            tree, links, rest, rest_q, self._single, self._read, stage, self._unit, tuple(self.remarks), files
+            tree,
+            links,
+            rest,
+            rest_q,
+            self._single_precision,
+            self._joints_read,
+            stage,
+            self._meters_per_unit,
+            tuple(self.remarks),
+            files,
         )
 
     # -- the stage -----------------------------------------------------------------------------------
 
-    def _report(self, kind: Kind, where: str, what: str, remedy: str | None = None) -> None:
-        self.remarks.append(Remark(kind, where, what, remedy))
+    def _report(self, kind: RemarkKind, where: str, what: str, remedy: str | None = None) -> None:
+        self.remarks.append(UsdRemark(kind, where, what, remedy))
 
-    def _prims(self) -> list[Any]:
+    def _find_prims(self) -> list[Any]:
         """Return the prims of the stage, without the prototypes of point instancers."""
         physics, prims = self.pxr.UsdPhysics, list[Any]()
         inside = self.pxr.Usd.TraverseInstanceProxies()
@@ -442,7 +451,7 @@ class _StageReader:
                 self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
         return prims
 
-    def _value(self, prim: Any, name: str) -> Any:
+    def _read_value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute, or its default if the value is missing or blocked, or None."""
         attribute = prim.GetAttribute(name)
         if not attribute:
@@ -455,9 +464,9 @@ class _StageReader:
 
     def _report_timed(self, attribute: Any, instead: str) -> None:
         path = str(attribute.GetPath())
-        if path in self._looked_at:
+        if path in self._checked_paths:
             return
-        self._looked_at.add(path)
+        self._checked_paths.add(path)
         kind = "a spline" if getattr(attribute, "HasSpline", lambda: False)() else "time samples"
         if kind == "time samples" and not attribute.GetNumTimeSamples():
             return
@@ -467,8 +476,8 @@ class _StageReader:
             self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
-        while prim and (path := str(prim.GetPath())) not in self._looked_at:
-            self._looked_at.add(path)
+        while prim and (path := str(prim.GetPath())) not in self._checked_paths:
+            self._checked_paths.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
                 placed = self.pxr.UsdGeom.Xformable(prim)
                 for one in placed.GetOrderedXformOps():
@@ -477,15 +486,15 @@ class _StageReader:
                     return
             prim = prim.GetParent()
 
-    def _uneven_scale(self, prim: Any) -> str | None:
+    def _find_uneven_scale(self, prim: Any) -> str | None:
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
-            if np.ptp(scale) > _SHEAR * SINGLE * scale.max():
+            if np.ptp(scale) > _MAX_SHEAR * SINGLE_ROUNDOFF * scale.max():
                 return f"the scale {', '.join(f'{x:g}' for x in scale)} of {prim.GetPath()}"
         return None
 
-    def _placed(self, prim: Any) -> tuple[FloatArray, FloatArray]:
+    def _world_pose(self, prim: Any) -> tuple[FloatArray, FloatArray]:
         """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,)."""
         self._report_timed_transforms(prim)
         where = f"{self.source}: {prim.GetPath()}"
@@ -498,28 +507,28 @@ class _StageReader:
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
-        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
+        if np.abs(R.T @ R - np.eye(3)).max() > _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
             message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
-            raise InputError(message, where=where, found=self._uneven_scale(prim), remedy=remedy)
+            raise InputError(message, where=where, found=self._find_uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
-        return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
+        return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._meters_per_unit), scale
 
-    def _collect(self, prims: list[Any]) -> None:
+    def _read_bodies_and_joints(self, prims: list[Any]) -> None:
         physics = self.pxr.UsdPhysics
         for prim in prims:
             if not prim.HasAPI(physics.RigidBodyAPI):
                 continue
-            if self._value(prim, "physics:rigidBodyEnabled") is False:
+            if self._read_value(prim, "physics:rigidBodyEnabled") is False:
                 continue
             path = str(prim.GetPath())
-            T, scale = self._placed(prim)
+            T, scale = self._world_pose(prim)
             if scale[0] < 0.0:
                 what = "the transform of this body contains a reflection"
                 self._report("mirrored-body", path, what, "mirror the shapes instead")
-            self._bodies[path] = _Body(T, self._owner(prim))
+            self._bodies[path] = _Body(T, self._find_owner(prim))
         for prim in prims:
-            if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
+            if prim.IsA(physics.Joint) and (edge := self._read_joint(prim)) is not None:
                 self._edges.append(edge)
             self._report_couplings(prim)
 
@@ -528,12 +537,12 @@ class _StageReader:
         joint = prim.IsA(self.pxr.UsdPhysics.Joint)
         kind = str(prim.GetTypeName())
         ends = any(prim.HasRelationship(f"physics:body{i}") for i in (0, 1))
-        if not joint and (ends or any(word in kind for word in _COUPLINGS)):
+        if not joint and (ends or any(word in kind for word in _COUPLING_WORDS)):
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
             # The direction in "physxMimicJoint:rotX:referenceJoint" may differ from the joint's direction.
-            own = _MIMIC_RULE.fullmatch(rule.GetName())
+            own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
                 if schema not in schemas:
@@ -541,11 +550,11 @@ class _StageReader:
                     self._report("lost-mimic", path, what, "apply the schema, or remove the attributes")
         unread = []
         for schema in schemas:
-            if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
+            if not any(word in schema for word in _COUPLING_WORDS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
                 # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add nonlinear terms.
-                if more := [name for name in _HIGHER if self._value(prim, name)]:
+                if more := [name for name in _NONLINEAR_COEFFICIENTS if self._read_value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._report("left-out-of-usd", path, what)
                 continue
@@ -554,7 +563,7 @@ class _StageReader:
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
-    def _owner(self, prim: Any) -> str | None:
+    def _find_owner(self, prim: Any) -> str | None:
         """Return the path of the articulation root at or above a prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
@@ -564,9 +573,9 @@ class _StageReader:
 
     # -- joints --------------------------------------------------------------------------------------
 
-    def _edge(self, prim: Any) -> _Edge | None:
+    def _read_joint(self, prim: Any) -> _JointPrim | None:
         path = str(prim.GetPath())
-        if self._value(prim, "physics:jointEnabled") is False:
+        if self._read_value(prim, "physics:jointEnabled") is False:
             self._report("left-out-of-usd", path, "this joint is disabled")
             return None
         sides = []
@@ -575,7 +584,7 @@ class _StageReader:
             if len(targets) > 1:
                 self._report("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
                 return None
-            side = self._side(prim, i, str(targets[0]) if targets else None)
+            side = self._read_side(prim, i, str(targets[0]) if targets else None)
             if side is None:
                 instanced = self._is_instanced(targets[0])
                 reason = "is a prototype of a PointInstancer" if instanced else "does not exist"
@@ -589,45 +598,50 @@ class _StageReader:
             self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
         kind_name = str(prim.GetTypeName()).removeprefix("Physics")
-        if self._value(prim, "physics:excludeFromArticulation") or kind_name.endswith(_NO_JOINTS):
-            what = f"a tree cannot represent this {kind_name}, which is outside the articulation"
+        excluded = self._read_value(prim, "physics:excludeFromArticulation")
+        if excluded or kind_name.endswith(_UNSUPPORTED_JOINTS):
+            what = f"a tree cannot represent this {kind_name}"
+            if excluded:
+                what = f"this {kind_name} is excluded from the articulation"
             self._report("left-out-of-usd", path, what)
             return None
-        kind, axis, limits, free = self._motion(prim)
+        kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
         # A pose relative to the world is converted back to the up axis of the stage.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
-        self._read[path] = JointReading(
+        self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
             D[:3, 3], quaternion_of(D[:3, :3]), limits, size,
         )  # fmt: skip
-        return _Edge(prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, size, rounded)
+        return _JointPrim(
+            prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, size, rounded
+        )
 
-    def _side(
+    def _read_side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return four values about body i of a joint.
 
         The values are the path of the body (None for the world), the pose (m) of the joint frame in the body,
-        and the body's part of `_Edge.size` and `_Edge.rounded`. Return None if the body does not exist or is
-        in a prototype of a point instancer.
+        and the body's part of `_JointPrim.length_sum` and `_JointPrim.rounding`. Return None if the body does
+        not exist or is in a prototype of a point instancer.
         """
-        p = np.array(self._value(prim, f"physics:localPos{i}"), float)
-        quaternion = self._value(prim, f"physics:localRot{i}")
+        p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
+        quaternion = self._read_value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
         size = float(np.linalg.norm(xyzw))
         if not (np.isfinite(p).all() and math.isfinite(size) and size > 0.0):
             message = f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero"
             found = f"{p.tolist()}, {quaternion}"
             raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
-        off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
-        R, p = rotation_of(xyzw / size), p * self._unit
+        off = float(np.linalg.norm(_rounding(p))) * self._meters_per_unit, _quaternion_rounding(xyzw)
+        R, p = rotation_from_quaternion(xyzw / size), p * self._meters_per_unit
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
         if not other or not other.IsDefined() or self._is_instanced(target):
             return None
-        T, scale = self._placed(other)
+        T, scale = self._world_pose(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
         off = off[0] * float(np.abs(scale).max()), off[1]
         while other and str(other.GetPath()) not in self._bodies:
@@ -656,23 +670,23 @@ class _StageReader:
                     turned |= rotates
                     moved |= not rotates or str(prim.GetPath()) != path
             prim = prim.GetParent()
-        return SINGLE * length if moved else 0.0, 2.0 * SINGLE if turned else 0.0
+        return SINGLE_ROUNDOFF * length if moved else 0.0, 2.0 * SINGLE_ROUNDOFF if turned else 0.0
 
     def _is_instanced(self, path: object) -> bool:
         return any(str(path).startswith(one) for one in self._instancers)
 
-    def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+    def _read_motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return kind, axis, limits (rad or m) and free directions; refuse an unsupported joint."""
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
         for schema, turns in ((physics.RevoluteJoint, True), (physics.PrismaticJoint, False)):
             if prim.IsA(schema):
-                letter = str(self._value(prim, "physics:axis"))
-                if letter not in _AXES:
+                letter = str(self._read_value(prim, "physics:axis"))
+                if letter not in _AXIS_INDEX:
                     raise InputError("the axis of a joint must be X, Y or Z", where=path, found=letter)
-                ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
-                return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
+                ends = (float(self._read_value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
+                return self._make_motion(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
             remedy = "use three revolute joints (singular if the middle joint is at a right angle)"
             raise InputError("urdfkin does not support spherical joints", where=path, remedy=remedy)
@@ -680,22 +694,26 @@ class _StageReader:
             message = "urdfkin does not support this kind of joint"
             remedy = "exclude it from the articulation, or use another joint"
             raise InputError(message, where=path, found=str(prim.GetTypeName()), remedy=remedy)
-        return self._general_motion(prim, path)
+        return self._read_general_motion(prim, path)
 
-    def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions."""
+    def _read_general_motion(
+        self, prim: Any, path: str
+    ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+        """Return the result of `_read_motion` for a `PhysicsJoint`, which has limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
         for direction in _DIRECTIONS:
             low, high = _NO_LIMITS
             if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
-                low, high = (self._end(prim, f"limit:{direction}:physics:{end}") for end in ("low", "high"))
+                low, high = (
+                    self._read_limit(prim, f"limit:{direction}:physics:{end}") for end in ("low", "high")
+                )
             if low <= high:  # A lower limit above the upper limit locks the direction.
                 limits[direction] = low, high
         free = tuple(limits)
         if not free:
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
         if len(free) == 1:
-            return self._bounded(path, free[0], iter(limits[free[0]]))
+            return self._make_motion(path, free[0], iter(limits[free[0]]))
         kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _DIRECTIONS: JointKind.FLOATING}.get(free)
         if kind is None:
             message = "urdfkin does not support a joint with these degrees of freedom"
@@ -705,7 +723,7 @@ class _StageReader:
             self._report("unused-in-usd", path, "the limits of this planar or floating joint are not read")
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
-    def _end(self, prim: Any, name: str) -> float:
+    def _read_limit(self, prim: Any, name: str) -> float:
         """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -713,24 +731,24 @@ class _StageReader:
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
-        return float(self._value(prim, name))
+        return float(self._read_value(prim, name))
 
-    def _bounded(
+    def _make_motion(
         self, path: str, free: str, ends: Iterator[float]
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST else end for end in ends)
+        lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST_SINGLE else end for end in ends)
         if not lower <= upper:
             message = "the lower limit of a joint is above its upper limit"
             raise InputError(message, where=path, found=f"{lower:g} and {upper:g}")
-        kind, factor = JointKind.PRISMATIC, self._unit
+        kind, factor = JointKind.PRISMATIC, self._meters_per_unit
         if free.startswith("rot"):
             bounded = math.isfinite(lower) and math.isfinite(upper)
             kind, factor = JointKind.REVOLUTE if bounded else JointKind.CONTINUOUS, math.pi / 180.0
-        return kind, _unit(_AXES[free[-1]]), (lower * factor, upper * factor), free
+        return kind, _unit(_AXIS_INDEX[free[-1]]), (lower * factor, upper * factor), free
 
     # -- articulations -------------------------------------------------------------------------------
 
-    def _articulations(self) -> list[_Articulation]:
+    def _find_articulations(self) -> list[_Articulation]:
         """Return the groups of connected bodies; report and ignore joints between articulations."""
         above: dict[str, str] = {path: path for path in self._bodies}
 
@@ -772,57 +790,61 @@ class _StageReader:
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
                 continue  # A single body that is fixed to the world is not a robot.
-            self._name(group)
-            merged.setdefault(self._root(group) or group.path, []).append(group)
-        found = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
-        paths = Counter(group.path for group in found)
-        for group in found:
+            self._set_path(group)
+            merged.setdefault(self._find_root(group) or group.path, []).append(group)
+        articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
+        paths = Counter(group.path for group in articulations)
+        for group in articulations:
             if paths[group.path] > 1:
-                group.path = self._root(group) or group.bodies[0]
-        return found
+                group.path = self._find_root(group) or group.bodies[0]
+        return articulations
 
-    def _name(self, group: _Articulation) -> None:
+    def _set_path(self, group: _Articulation) -> None:
         for edge in group.edges:
             if edge.prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 group.path = edge.path
-        group.path = group.path or self._root(group) or group.bodies[0]
+        group.path = group.path or self._find_root(group) or group.bodies[0]
 
-    def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
+    def _choose_articulation(
+        self, articulations: list[_Articulation], articulation: str | None
+    ) -> _Articulation:
         """Return the articulation with a path or name, or all articulations below another prim."""
-        if not found:
+        if not articulations:
             message = "this stage has no joint between bodies"
             remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
             raise InputError(message, where=self.source, found=f"{len(self._bodies)} bodies", remedy=remedy)
-        paths = [group.path for group in found]
-        if wanted is None:
-            if len(found) > 1:
-                message = f"this stage has {len(found)} articulations"
+        paths = [group.path for group in articulations]
+        if articulation is None:
+            if len(articulations) > 1:
+                message = f"this stage has {len(articulations)} articulations"
                 remedy = (
                     "choose one with --articulation PATH; the PATH of an ancestor chooses all articulations"
                     " below it"
                 )
                 raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
-            return found[0]
-        if not wanted:
-            raise UnknownNameError("articulation", wanted, paths, where=self.source)
-        own = [group for group in found if wanted in (group.path, group.path.rpartition("/")[2])]
-        if len(own) == 1:
-            return own[0]
-        below = [group for group in found if group.path.startswith(wanted.rstrip("/") + "/")]
-        if own or not below:
-            raise UnknownNameError("articulation", wanted, paths, where=self.source)
-        return self._merge(below, wanted.rstrip("/") or "/")
+            return articulations[0]
+        if not articulation:
+            raise UnknownNameError("articulation", articulation, paths, where=self.source)
+        matching = [
+            group for group in articulations if articulation in (group.path, group.path.rpartition("/")[2])
+        ]
+        if len(matching) == 1:
+            return matching[0]
+        below = [group for group in articulations if group.path.startswith(articulation.rstrip("/") + "/")]
+        if matching or not below:
+            raise UnknownNameError("articulation", articulation, paths, where=self.source)
+        return self._merge(below, articulation.rstrip("/") or "/")
 
     def _merge(self, groups: list[_Articulation], path: str) -> _Articulation:
         for group in groups:
-            if len(groups) > 1 and self._root(group) is not None:
+            if len(groups) > 1 and self._find_root(group) is not None:
                 what = "this articulation is not attached to the world, so it cannot be joined with others"
                 where = f"{self.source}: {group.path}"
                 raise InputError(what, where=where, remedy="choose one articulation")
         bodies = [body for group in groups for body in group.bodies]
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
-    def _root(self, group: _Articulation) -> str | None:
+    def _find_root(self, group: _Articulation) -> str | None:
         """Return the root body of a group, or None if the root is the world."""
         if any(None in edge.ends for edge in group.edges):
             return None
@@ -833,17 +855,17 @@ class _StageReader:
 
     # -- the tree ------------------------------------------------------------------------------------
 
-    def _tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
-        root = self._root(group)
-        around: dict[str | None, list[_Edge]] = {}
+    def _make_tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
+        root = self._find_root(group)
+        edges_of_body: dict[str | None, list[_JointPrim]] = {}
         for edge in group.edges:
             for end in edge.ends:
-                around.setdefault(end, []).append(edge)
-        ordered, reached, open_ = list[tuple[_Edge, bool]](), {root}, deque([root])
+                edges_of_body.setdefault(end, []).append(edge)
+        ordered, reached, open_ = list[tuple[_JointPrim, bool]](), {root}, deque([root])
         used = set[str]()
         while open_:
             here = open_.popleft()
-            for edge in around.get(here, []):
+            for edge in edges_of_body.get(here, []):
                 backwards = edge.ends[1] == here
                 there = edge.ends[0 if backwards else 1]
                 if edge.path in used:
@@ -853,68 +875,68 @@ class _StageReader:
                     self._report_loop(edge)
                     continue
                 reached.add(there)
-                edge.name = unique(edge.name, self._joint_names)
+                edge.name = make_unique(edge.name, self._joint_names)
                 ordered.append((edge, backwards))
                 open_.append(there)
-        links: dict[str | None, str] = {None: unique("world", self._link_names)} if root is None else {}
+        links: dict[str | None, str] = {None: make_unique("world", self._link_names)} if root is None else {}
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
-                links[path] = unique(self._short(path), self._link_names)
-        rows = [row for edge, back in ordered for row in self._joints(edge, links, backwards=back)]
-        rules = dict(self._mimics([edge for edge, _ in ordered]))
+                links[path] = make_unique(self._shorten(path), self._link_names)
+        rows = [row for edge, back in ordered for row in self._make_joints(edge, links, backwards=back)]
+        rules = dict(self._resolve_mimic_rules([edge for edge, _ in ordered]))
         rows = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in rows]
         for edge, _ in ordered:
             if self._is_outside(edge, group):
                 what = f"this {edge.kind.value} joint leads to a body outside {group.path}"
                 self._report("outside-joint", edge.path, what)
         prims = {link: path for path, link in links.items() if path is not None}
-        for path, parent in self._frames(list(prims.values())):
-            link = unique(path.rpartition("/")[2], self._link_names)
+        for path, parent in self._find_frames(list(prims.values())):
+            link = make_unique(path.rpartition("/")[2], self._link_names)
             try:
-                T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
+                T = inverse(self._bodies[parent].T) @ self._world_pose(self.stage.GetPrimAtPath(path))[0]
             except InputError as error:
                 self._report("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
-            joint = fixed_joint(unique(f"{link}_fixed", self._joint_names), T)
+            joint = make_fixed_joint(make_unique(f"{link}_fixed", self._joint_names), T)
             bounds = self._rounding_of_transforms(path, parent, joint.length)
-            self._single[joint.name] = *bounds, joint.length, 0.0, 0.0
+            self._single_precision[joint.name] = *bounds, joint.length, 0.0, 0.0
             rows.append((joint, links[parent], link))
             prims[link] = path
-        self._read = {edge.path: self._read[edge.path] for edge, _ in ordered}
+        self._joints_read = {edge.path: self._joints_read[edge.path] for edge, _ in ordered}
         tops = {path.split("/")[1] for path in (group.path, *group.bodies) if path != "/"}
         top = group.path.split("/")[1] or (tops.pop() if len(tops) == 1 else Path(self.source).stem)
         return build_tree(top, links[root], rows), prims
 
-    def _report_loop(self, edge: _Edge) -> None:
+    def _report_loop(self, edge: _JointPrim) -> None:
         what = f"this {edge.kind.value} joint closes a loop, which a tree cannot represent"
         self._report("left-out-of-usd", edge.path, what)
 
-    def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
+    def _is_outside(self, edge: _JointPrim, group: _Articulation) -> bool:
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False
         below = [end == group.path or end.startswith(inside) for end in edge.ends if end is not None]
         return len(set(below)) > 1
 
-    def _short(self, path: str) -> str:
+    def _shorten(self, path: str) -> str:
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
                 return "_".join(parts[-n:])
         return parts[-1]
 
-    def _joints(
-        self, edge: _Edge, links: Mapping[str | None, str], *, backwards: bool
+    def _make_joints(
+        self, edge: _JointPrim, links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
         (A, B), (parent, child), axis, kind = edge.frames, edge.ends, edge.axis, edge.kind
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
         name, here, there = edge.name, links[parent], links[child]
-        mimic_error = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
+        mimic_error = SINGLE_ROUNDOFF if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         lever = float(np.linalg.norm(B[:3, 3]))
-        self._single[name] = *edge.rounded, edge.size, mimic_error, lever
+        self._single_precision[name] = *edge.rounding, edge.length_sum, mimic_error, lever
         if kind is JointKind.FIXED:
-            yield fixed_joint(name, A @ inverse(B)), here, there
+            yield make_fixed_joint(name, A @ inverse(B)), here, there
             return
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
@@ -924,7 +946,7 @@ class _StageReader:
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
             )
-        limit = None if free else self._limit(edge)
+        limit = None if free else self._make_limit(edge)
         if kind is JointKind.FLOATING:
             A = B = np.eye(4)
         elif not free and (kind is JointKind.PRISMATIC or not B[:3, 3].any()):
@@ -936,16 +958,16 @@ class _StageReader:
             return
         # In a URDF, the joint frame is also the frame of the child link.
         # A child frame with another pose needs a further link.
-        between = unique(f"{name}_link", self._link_names)
+        between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between
-        yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
+        yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
 
-    def _limit(self, edge: _Edge) -> Limit | None:
+    def _make_limit(self, edge: _JointPrim) -> Limit | None:
         lower, upper = edge.limits
         names = ("newton:velocityLimit", "physxJoint:maxJointVelocity")
-        rates = (self._value(edge.prim, name) for name in names)
+        rates = (self._read_value(edge.prim, name) for name in names)
         rate = next((float(x) for x in rates if x is not None), math.inf)
-        rate = rate * self._factor(edge.kind) if 0.0 < rate < _LARGEST else math.inf
+        rate = rate * self._factor(edge.kind) if 0.0 < rate < _LARGEST_SINGLE else math.inf
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
                 what = "the joint has only one limit; a URDF joint has two or none, so the limit is ignored"
@@ -953,29 +975,33 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
+        if turns and _NEGLIGIBLE_DEGREES < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            what = f"a prismatic joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
+            absent, value = "limits", f"+-{SLIDE_LIMIT:g}"
+            if math.isfinite(lower) or math.isfinite(upper):
+                absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
+                value += f"{SLIDE_LIMIT:g}"
+            what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
+            lower, upper = (x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
 
-    def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
+    def _find_frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield the path of each Xform prim that becomes a link, with the path of the body above the prim."""
         body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
         def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
             for child in prim.GetChildren():
-                opened = str(child.GetPath()) in self.opened
-                if child.HasAPI(body_api) or child.IsInstance() or opened:
+                is_expanded = str(child.GetPath()) in self.expanded_instances
+                if child.HasAPI(body_api) or child.IsInstance() or is_expanded:
                     continue
                 kind = child.GetTypeName()
                 if kind == "Scope":
                     yield from below(child, body)
-                if kind != "Xform" or child.GetName().lower() in _SHAPES:
+                if kind != "Xform" or child.GetName().lower() in _SHAPE_GROUPS:
                     continue
                 inside = self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
                 groups_shapes = (
@@ -992,35 +1018,35 @@ class _StageReader:
 
     # -- mimic joints --------------------------------------------------------------------------------
 
-    def _mimics(self, edges: Sequence[_Edge]) -> Iterator[tuple[str, Mimic]]:
+    def _resolve_mimic_rules(self, edges: Sequence[_JointPrim]) -> Iterator[tuple[str, Mimic]]:
         by_path = {edge.path: edge for edge in edges}
         rules: dict[str, Mimic] = {}
         for edge in edges:
-            for rule in self._rules(edge):
+            for rule in self._read_mimic_rules(edge):
                 leader = by_path.get(rule.leader)
                 if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
                     named = rule.leader or "nothing"
                     what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
-                elif edge.path in rules or leads(rules, rule.leader, edge.path):
+                elif edge.path in rules or depends_on(rules, rule.leader, edge.path):
                     what = "this joint has two mimic rules, or mimics itself through other joints"
                     self._report("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
         for path in rules:
-            rule = resolve(rules, path)
+            rule = resolve_rule(rules, path)
             yield by_path[path].name, replace(rule, leader=by_path[rule.leader].name)
 
-    def _rules(self, edge: _Edge) -> Iterator[Mimic]:
+    def _read_mimic_rules(self, edge: _JointPrim) -> Iterator[Mimic]:
         """Yield the mimic rules of a joint, in rad or m; `Mimic.leader` is a prim's path."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
-            if self._value(prim, "newton:mimicEnabled") is False:
+            if self._read_value(prim, "newton:mimicEnabled") is False:
                 self._report("left-out-of-usd", edge.path, "the mimic rule of this joint is disabled")
                 return
             leader = _target(prim, "newton:mimicJoint")
-            c0, c1 = self._value(prim, "newton:mimicCoef0"), self._value(prim, "newton:mimicCoef1")
+            c0, c1 = self._read_value(prim, "newton:mimicCoef0"), self._read_value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
             self._compare_units(edge, leader)
             yield Mimic(leader, multiplier, offset * own)
@@ -1031,15 +1057,18 @@ class _StageReader:
                 continue
             prefix = f"physxMimicJoint:{freedom}"
             leader = _target(prim, f"{prefix}:referenceJoint")
-            gearing, offset = self._value(prim, f"{prefix}:gearing"), self._value(prim, f"{prefix}:offset")
+            gearing, offset = (
+                self._read_value(prim, f"{prefix}:gearing"),
+                self._read_value(prim, f"{prefix}:offset"),
+            )
             multiplier = -1.0 if gearing is None else -float(gearing)
             self._compare_units(edge, leader)
             yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
 
     def _factor(self, kind: JointKind) -> float:
-        return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
+        return self._meters_per_unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
-    def _compare_units(self, edge: _Edge, leader: str) -> None:
+    def _compare_units(self, edge: _JointPrim, leader: str) -> None:
         kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
             what = "USD defines no unit for mimic rules between an angle and a length; urdfkin uses m and rad"
@@ -1047,15 +1076,15 @@ class _StageReader:
 
     # -- the whole stage -----------------------------------------------------------------------------
 
-    def _report_loose_bodies(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
-        joined = {path for group in found for path in group.bodies}
+    def _report_loose_bodies(self, chosen: _Articulation, articulations: Sequence[_Articulation]) -> None:
+        joined = {path for group in articulations for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):
                 what = "no joint connects this body with the robot"
                 self._report("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
 
-    def _rest(
+    def _find_rest_configuration(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
     ) -> FloatArray:
         q = np.zeros(tree.nq)
@@ -1072,7 +1101,7 @@ class _StageReader:
                 S = J[:3, :3] - J[:3, :3].T
                 sine = float(edge.axis @ np.array([S[2, 1], S[0, 2], S[1, 0]])) / 2.0
                 values[edge.path] = math.atan2(sine, (float(np.trace(J[:3, :3])) - 1.0) / 2.0)
-        by_name = {edge.name: edge.path for edge in group.edges if edge.path in self._read}
+        by_name = {edge.name: edge.path for edge in group.edges if edge.path in self._joints_read}
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.kind is JointKind.FLOATING:
                 q[at + 6] = 1.0
@@ -1105,9 +1134,9 @@ class _StageReader:
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
-            factor = unit / self._unit
-            if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
-                what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g}"
+            factor = unit / self._meters_per_unit
+            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._is_scaled(prim, factor):
+                what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._meters_per_unit:g}"
                 remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
@@ -1119,7 +1148,9 @@ class _StageReader:
     def _is_scaled(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
-        return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
+        return bool(
+            (np.abs(scale - 1.0) <= _MAX_SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount).all()
+        )
 
     def _is_resolved(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
@@ -1136,7 +1167,7 @@ def _rounding(x: FloatArray) -> FloatArray:
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
-def _turned(xyzw: FloatArray) -> float:
+def _quaternion_rounding(xyzw: FloatArray) -> float:
     """Bound the change (rad) of a rotation when the numbers of its quaternion are rounded.
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
@@ -1151,7 +1182,7 @@ def _turned(xyzw: FloatArray) -> float:
 
 
 def _is_mimic(schema: str) -> bool:
-    return schema.partition(":")[0] in _MIMICS
+    return schema.partition(":")[0] in _MIMIC_SCHEMAS
 
 
 def _target(prim: Any, name: str) -> str:

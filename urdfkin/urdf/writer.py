@@ -24,43 +24,43 @@ def to_urdf(tree: KinematicTree) -> str:
     URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The file declares version 1.2
     if a <limit> element omits an infinite limit of effort or velocity.
     """
-    version = ' version="1.2"' if any(_needs_newer_version(joint) for joint in tree.joints) else ""
-    lines = [f'<robot name="{attribute(tree.name)}"{version}>']
-    lines += [f'  <link name="{attribute(link)}"/>' for link in tree.links]
+    version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
+    lines = [f'<robot name="{escape_attribute(tree.name)}"{version}>']
+    lines += [f'  <link name="{escape_attribute(link)}"/>' for link in tree.links]
     for number, joint in enumerate(tree.joints):
-        lines += _joint(joint, tree.links[joint.parent], tree.links[number + 1])
+        lines += _write_joint(joint, tree.links[joint.parent], tree.links[number + 1])
     lines.append("</robot>")
     return "\n".join(lines) + "\n"
 
 
-def _needs_newer_version(joint: Joint) -> bool:
+def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
     # A joint without position limits has no <limit> element if all other limits are infinite.
-    return any(infinite) and (joint.kind.bounded or not all(infinite))
+    return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 
-def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
+def _write_joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
     T = joint.T_parent_joint
-    yield f'  <joint name="{attribute(joint.name)}" type="{joint.kind.value}">'
-    yield f'    <parent link="{attribute(parent)}"/>'
-    yield f'    <child link="{attribute(child)}"/>'
-    yield f'    <origin xyz="{numbers(T[:3, 3])}" rpy="{numbers(rpy_of(T[:3, :3]))}"/>'
+    yield f'  <joint name="{escape_attribute(joint.name)}" type="{joint.kind.value}">'
+    yield f'    <parent link="{escape_attribute(parent)}"/>'
+    yield f'    <child link="{escape_attribute(child)}"/>'
+    yield f'    <origin xyz="{format_numbers(T[:3, 3])}" rpy="{format_numbers(rpy_of(T[:3, :3]))}"/>'
     if joint.kind.has_axis:
-        yield f'    <axis xyz="{numbers(joint.axis)}"/>'
+        yield f'    <axis xyz="{format_numbers(joint.axis)}"/>'
     elif joint.kind is JointKind.PLANAR:
         yield '    <axis xyz="0 0 1"/>'
-    yield from _limit(joint, joint.limit)
+    yield from _write_limit(joint, joint.limit)
     if (rule := joint.mimic) is not None:
-        leader = attribute(rule.leader)
+        leader = escape_attribute(rule.leader)
         yield f'    <mimic joint="{leader}" multiplier="{rule.multiplier!r}" offset="{rule.offset!r}"/>'
     yield "  </joint>"
 
 
-def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
-    bounded = joint.kind.bounded
-    if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
+def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
+    has_limits = joint.kind.has_limits
+    if has_limits and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
         message = "a URDF needs finite position limits for a revolute or prismatic joint"
         remedy = "give the joint limits, or make it continuous if it rotates without limits"
         found = "none" if limit is None else f"{limit.lower} to {limit.upper}"
@@ -68,14 +68,14 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
     if limit is None:
         return
     named = [("effort", limit.effort), ("velocity", limit.velocity)]
-    if bounded:
+    if has_limits:
         named = [("lower", limit.lower), ("upper", limit.upper), *named]
     finite = [f'{name}="{float(value)!r}"' for name, value in named if math.isfinite(value)]
     if finite:
         yield f"    <limit {' '.join(finite)}/>"
 
 
-def numbers(values: Iterable[float]) -> str:
+def format_numbers(values: Iterable[float]) -> str:
     """Write numbers with all digits that restore the same doubles."""
     return " ".join(repr(float(value)) for value in values)
 
@@ -83,40 +83,40 @@ def numbers(values: Iterable[float]) -> str:
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
 
 
-def attribute(text: str) -> str:
+def escape_attribute(text: str) -> str:
     """Escape the value of an attribute; raise InputError for a character that XML does not allow."""
-    if bad := _NO_XML.search(text):
+    if bad := _INVALID_CHARACTER.search(text):
         found = f"U+{ord(bad[0]):04X}"
         raise InputError("XML does not allow this character", where=repr(text), found=found)
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
 #: Characters that XML 1.0 does not allow (production Char).
-_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_INVALID_CHARACTER = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
-def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
+def make_attribute_edits(data: bytes, target: Element, values: Mapping[str, str]) -> Iterator[Edit]:
     """Yield the edits that set attributes of an element; new attributes come last."""
-    name_end = at.offset + 1 + len(at.tag.encode())
-    tag = START_TAG.match(data, at.offset)
+    name_end = target.offset + 1 + len(target.tag.encode())
+    tag = START_TAG.match(data, target.offset)
     end = tag.end() if tag else name_end
     known = {match[1].decode(): match.span(2) for match in ATTRIBUTE.finditer(data, name_end, end)}
     added = ""
     for name, value in values.items():
         if name not in known:
-            added += f' {name}="{attribute(value)}"'
+            added += f' {name}="{escape_attribute(value)}"'
         else:
             start, end = known[name]
-            yield Edit(start + 1, end - 1, attribute(value))
+            yield Edit(start + 1, end - 1, escape_attribute(value))
     if added:
         last = max((end for _, end in known.values()), default=name_end)
         yield Edit(last, last, added)
 
 
-def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts the text `element` before `at`, with the same indentation."""
-    indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
-    return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))
+def make_insertion(data: bytes, target: Element, element: str) -> Edit:
+    """Return the edit that inserts the text `element` before `target`, with the same indentation."""
+    indentation = _INDENTATION.search(data[max(0, target.offset - 1000) : target.offset])
+    return Edit(target.offset, target.offset, element + (indentation[1].decode() if indentation else ""))

@@ -24,22 +24,22 @@ from urdfkin.errors import QuestionsSection, SourceError, UnknownNameError, Urdf
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.catalogue import VARIABLES, search_path
-from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
+from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
 
 #: Limits of the search for declared arguments: size of a file in bytes, and number of files.
-MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
+MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 
 #: Function that returns the folder of a package, or raises LookupError.
-Find = Callable[[str], str]
+FindPackage = Callable[[str], str]
 
-_USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
-_FIND = re.compile(r"\$\(find\s+([^\s()]+)\s*\)")
-_COMPUTED = re.compile(r"\$[({]|[*?\[]")
+_ARGUMENT_USE = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
+_PACKAGE_USE = re.compile(r"\$\(find\s+([^\s()]+)\s*\)")
+_COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
 
-def arguments_of(path: Path, find: Find) -> set[str] | None:
+def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
     """Return the argument names of a xacro file and its included files; None if not all are readable."""
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -48,28 +48,28 @@ def arguments_of(path: Path, find: Find) -> set[str] | None:
             if file in seen:
                 continue
             seen.add(file)
-            if len(seen) > MOST_FILES:
+            if len(seen) > MAX_SEARCHED_FILES:
                 return None
-            for element in Xml.fromstring(read_bytes(file, MOST_ARGUMENTS)).iter():
+            for element in Xml.fromstring(read_bytes(file, MAX_SEARCHED_BYTES)).iter():
                 for text in (*element.attrib.values(), element.text or ""):
-                    names.update(_USED.findall(text))
+                    names.update(_ARGUMENT_USE.findall(text))
                 namespace, _, tag = str(element.tag).rpartition("}")
                 if "xacro" in namespace and tag == "arg":
                     names.add(element.get("name", ""))
                 if "xacro" in namespace and tag == "include":
-                    files.append(_included_file(element.get("filename", ""), file, find))
+                    files.append(_find_included_file(element.get("filename", ""), file, find))
     except (SourceError, RefusedError, LookupError, ValueError, Xml.ParseError):
         return None
     return names
 
 
-def _included_file(name: str, beside: Path, find: Find) -> Path:
+def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> Path:
     """Return the path of an included file; raise LookupError for a computed name or an unknown package."""
-    folder = beside.parent
-    if match := _FIND.match(name):
+    folder = referring_file.parent
+    if match := _PACKAGE_USE.match(name):
         folder = Path(find(match[1]))
         name = name[match.end() :].lstrip("/")
-    if _COMPUTED.search(name) or not name:
+    if _COMPUTED_NAME.search(name) or not name:
         raise LookupError(name)
     return folder / name
 
@@ -98,12 +98,12 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         remedy = f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf"
         raise XacroError(message, where=str(path), remedy=remedy, question=QuestionsSection.XACRO)
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
-    output, status = ask_python(command, _request(path.absolute(), arguments, patience), patience, MOST)
+    output, status = ask_python(command, _make_request(path.absolute(), arguments, patience), patience, MOST)
     if status is None:
         raise XacroError("xacro did not finish", where=str(path), found=f"{patience:g} s")
     if len(output) > MOST:
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
-    answer = _answer(output)
+    answer = _parse_answer(output)
     if "urdf" in answer:
         if isinstance(names := answer.get("arguments"), list):  # The process is not trusted.
             declared = [str(name) for name in names]
@@ -115,26 +115,29 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
-        " docs/xacro.md lists the operations that a file may do",
+        remedy="set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read;"
+        " set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists the operations that a file may"
+        " do",
         question=QuestionsSection.XACRO,
     )
 
 
-def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
-    paths = {name: [str(folder.absolute()) for folder in search_path(name)] for name in VARIABLES}
+def _make_request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
+    paths = {
+        name: [str(folder.absolute()) for folder in search_path(name)] for name in PACKAGE_PATH_VARIABLES
+    }
     installed = [folder for folders in paths.values() for folder in folders]
     request = {
         "path": str(path),
         "arguments": dict(arguments),
         "search": {name: os.pathsep.join(folders) for name, folders in paths.items()},
-        "ground": asdict(Ground.around(path, installed, list(arguments.values()))),
+        "allowed_paths": asdict(AllowedPaths.of_file(path, installed, list(arguments.values()))),
         "seconds": ceil(patience) + 1,
     }
     return json.dumps(request).encode()
 
 
-def _answer(output: bytes) -> dict[str, Any]:
+def _parse_answer(output: bytes) -> dict[str, Any]:
     try:
         answer = json.loads(output.splitlines()[-1])
     except (IndexError, ValueError):

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from urdfkin.errors import InputError
 from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
 from urdfkin.kinematics.rotation import (
+    EULER_SEQUENCES,
     NEAREST,
-    SEQUENCES,
     euler_of,
     quaternion_of,
     singularity_distance,
 )
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import Samples, draw
+from urdfkin.model.configuration import Samples, draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -50,7 +50,7 @@ _INTERVALS = np.vectorize(exact, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
 #: Angles about fixed axes are in no group: the Jacobian of Euler angles has the same rows in reverse order.
 _REPRESENTATIONS = {
-    "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
+    "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
 
@@ -99,7 +99,7 @@ def accuracy_study(
     Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians
     from the rotation and the Jacobian of each library (eq. 7.122).
     """
-    drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
+    drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
         lines = tuple(_AccuracyBatch(robot, drawn, base).lines())

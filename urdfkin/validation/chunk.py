@@ -20,8 +20,8 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import Samples, draw
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import Samples, draw_samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, without_mimic_rules
 from urdfkin.robot import Robot
@@ -85,7 +85,7 @@ class Chunk:
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
         samples = min(DRAW_SIZE, self.samples - i * DRAW_SIZE)
-        return draw(tree, samples, rng, with_special=self.first + i == 0)
+        return draw_samples(tree, samples, rng, with_special=self.first + i == 0)
 
 
 @dataclass(slots=True)
@@ -242,7 +242,7 @@ class _Block(_ComparisonBatch):
         # The robot's cache keeps the compiled tree for all frames, but not a compiled tree for some frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
-        self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
+        self.size = magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
         # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
         # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -322,7 +322,7 @@ class _Screws(_ComparisonBatch):
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
-        size = magnitudes(plan, q, *still, STILL_STATE)
+        size = magnitudes(plan, q, *still, FIXED_BASE_STATE)
         J = self.timings.time_call("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]

@@ -192,7 +192,7 @@ class Mistakes:
         q, v = self._native_inputs((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
-        return found if self.conversion is None else self.conversion.six(found)
+        return found if self.conversion is None else self.conversion.reorder_six_vector(found)
 
     def _native_inputs(self, inputs: Inputs) -> Inputs:
         return inputs if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
@@ -284,13 +284,13 @@ class Mistakes:
 
         lock = dict(self.robot.origin.lock)
         free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, lock=lock, verify=False)
-        own = [free.rate_names.index(name) for name in self.robot.rate_names]
+        own = [free.velocity_names.index(name) for name in self.robot.velocity_names]
         frame, method = self.frame, getattr(free, self.row.method)
         named = {} if self.reference is None else {"reference": self.reference}
 
         def expand(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
-            names = free.coordinate_names if letter == "q" else free.rate_names
-            own_names = self.robot.coordinate_names if letter == "q" else self.robot.rate_names
+            names = free.coordinate_names if letter == "q" else free.velocity_names
+            own_names = self.robot.coordinate_names if letter == "q" else self.robot.velocity_names
             found = np.zeros((len(x), len(names)))
             found[:, [names.index(name) for name in own_names]] = x
             for joint in mimics if moving else ():
@@ -381,7 +381,7 @@ class Mistakes:
                 other = self.robot.convention(name)
             except UrdfkinError:
                 continue
-            q, v = other.permutation, other.rate_permutation
+            q, v = other.permutation, other.velocity_permutation
             if q is None or v is None or len(q) != self.robot.nq or tuple(q.tolist()) in seen:
                 continue
             seen.add(tuple(q.tolist()))
@@ -413,7 +413,7 @@ def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]
     """Yield 0.0 and a sentence for each column that has the wrong sign, is zero or is another column."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
-    names = (mistakes.conversion or mistakes.robot).rate_names
+    names = (mistakes.conversion or mistakes.robot).velocity_names
     expected, actual = case.expected, case.actual
     size = np.maximum(case.scale, np.finfo(float).tiny)
 

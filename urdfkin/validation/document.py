@@ -128,11 +128,13 @@ class ReportedFinding(TypedDict):
     column: Annotated[Count, says("Column number of the problem, counted from 1.")]
     element: Annotated[str | None, says("Tag of the XML element with the problem; null: none.")]
     name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
-    oracle: Annotated[
+    pinocchio_reading: Annotated[
         Literal["refuses", "differs"] | None,
         says("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
     ]
-    also: Annotated[list[int], says("Line numbers of further findings that are merged into this finding.")]
+    other_lines: Annotated[
+        list[int], says("Line numbers of further findings that are merged into this finding.")
+    ]
 
 
 class ReportedDHRow(TypedDict):

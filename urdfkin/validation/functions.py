@@ -23,7 +23,7 @@ from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -371,7 +371,7 @@ class _Run:
 
     def check(self) -> FunctionCheck:
         robot = self.robot
-        drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH_SIZE):
@@ -489,7 +489,7 @@ class _Run:
         jacobian = partial(
             self.robot.jacobian, native_inputs[0], frame or self.frame, reference, verify=False
         )
-        return self.conversion.result(self.row.name, native_inputs, result, jacobian)
+        return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
@@ -500,13 +500,13 @@ class _Run:
         assert conversion is not None
         if name == "placement":
             return scale
-        scale = conversion.six(scale, 1)
+        scale = conversion.reorder_six_vector(scale, 1)
         if name in ("velocity", "acceleration"):
             return scale
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
                 f"urdfkin has no bound for the {name}: in this convention, the velocity of a floating or"
-                " planar joint has other axes or another reference point",
+                " planar joint has other axes",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
@@ -527,7 +527,7 @@ class _Run:
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
-        if conversion.permutation is not None and conversion.rate_permutation is not None:
+        if conversion.permutation is not None and conversion.velocity_permutation is not None:
             return 0.0
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
@@ -596,7 +596,7 @@ class _Run:
     def _column_names(self) -> tuple[str, ...]:
         if not self.row.columns:
             return ()
-        return (self.conversion or self.robot).rate_names
+        return (self.conversion or self.robot).velocity_names
 
 
 @dataclass

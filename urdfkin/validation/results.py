@@ -18,7 +18,7 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.system.documents import plain
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import hook
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Timings
 from urdfkin.validation.document import VALIDATION, Document, RunOutcome, ValidationVerdict, outcome
@@ -214,7 +214,7 @@ class ValidationReport(Displayable):
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
-            f"urdfkin validate {_source_words(origins)} {settings} {origins[0].options}".rstrip()
+            f"urdfkin validate {_source_words(origins)} {settings} {origins[0].command_line_options}".rstrip()
             for origins in _group_by_command([robot.origin for robot in self.robots])
         )
 
@@ -264,13 +264,15 @@ def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:
-        is_text = origin.again == "-"
-        groups.setdefault((origin.options, texts[origin.options] if is_text else 0), []).append(origin)
-        texts[origin.options] += is_text
+        is_text = origin.source_argument == "-"
+        groups.setdefault(
+            (origin.command_line_options, texts[origin.command_line_options] if is_text else 0), []
+        ).append(origin)
+        texts[origin.command_line_options] += is_text
     return list(groups.values())
 
 
 def _source_words(origins: Sequence[Origin]) -> str:
-    if tuple(origin.source for origin in origins) == examples():
+    if tuple(origin.source for origin in origins) == example_robots():
         return "--all"
-    return shlex.join(origin.again for origin in origins)
+    return shlex.join(origin.source_argument for origin in origins)

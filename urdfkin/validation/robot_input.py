@@ -24,7 +24,7 @@ from urdfkin.robot.loading import load, robot_of
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
-from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import Origin, Source, UrdfText, is_usd, is_xacro, read_source, unambiguous_path
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
 RobotSource = Source | DHTable | Robot
@@ -61,10 +61,10 @@ class RobotInput:
     def label(self) -> str:
         return self.origin.source
 
-    def text(self) -> Text:
+    def text(self) -> UrdfText:
         """Return the robot's text; raise InputError if the file has changed since the validation began."""
         if isinstance(self.source, bytes):
-            return Text(self.source, self.file, self.label, catalogue().get(self.label))
+            return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
         text = read_source(self.source)
         if self.sha256 and _digest(text.data) != self.sha256:
             raise InputError(
@@ -116,7 +116,7 @@ def make_robot_inputs(
             robot_inputs.append(make_robot_input(robot, mimic, root_joint, xacro_args, lock, joints))
         except Exception as error:
             if isinstance(robot, os.PathLike):
-                name = as_word(Path(robot))
+                name = unambiguous_path(Path(robot))
             else:
                 name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
             robot_inputs.append(RobotInput(b"", Origin(name, mimic, root_joint)))
@@ -150,7 +150,7 @@ def _make_robot_input(
     if is_xacro(robot):
         text = read_source(robot, xacro_args=xacro_args)  # The .xacro file is expanded only once.
         return _from_text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
-    source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
+    source = unambiguous_path(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
         return _from_word(source, mimic, root_joint)
     text = read_source(source)  # An open file, or standard input, can be read only once.

@@ -19,7 +19,7 @@ import numpy as np
 from urdfkin.dh import DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
-from urdfkin.model.configuration import NarrowedRange, draw, narrowed_ranges
+from urdfkin.model.configuration import RangeReduction, draw_samples, range_reductions
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
@@ -40,7 +40,7 @@ def describe(robot: Robot) -> ReportedModel:
     (6, True)
     """
     tree = robot.tree
-    narrowed = {one.joint: one for one in narrowed_ranges(tree)}
+    narrowed = {one.joint: one for one in range_reductions(tree)}
     data = {
         "name": robot.name,
         "source": robot.source,
@@ -53,7 +53,7 @@ def describe(robot: Robot) -> ReportedModel:
         "base": robot.base_frame,
         "tip": robot.tip_frame,
         "coordinates": robot.coordinate_names,
-        "rates": robot.rate_names,
+        "rates": robot.velocity_names,
         "frames": robot.frame_names,
         "links": robot.link_names,
         "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
@@ -61,7 +61,7 @@ def describe(robot: Robot) -> ReportedModel:
     return cast("ReportedModel", plain(data))
 
 
-def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str, Any]:
+def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[str, Any]:
     tree = robot.tree
     joint = tree.joints[i]
     return {
@@ -80,12 +80,12 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
     }
 
 
-def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
+def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which its mimic joints are within limits; None: all of it."""
     if narrowed is None:
         return None
-    lower, upper = narrowed.allowed or (None, None)
-    return {"lower": lower, "upper": upper, "by": narrowed.by}
+    lower, upper = narrowed.allowed_range or (None, None)
+    return {"lower": lower, "upper": upper, "by": narrowed.mimic_joints}
 
 
 #: Maximum number of chains in a summary; `urdfkin dh --all` lists all chains.
@@ -133,7 +133,7 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
     }
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "bound_ratio": None}
-    drawn = draw(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
+    drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
     checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
     return data | {
         "samples": checks[0].samples,

@@ -152,7 +152,7 @@ def _short(value: object) -> str:
 
 def _describe_robot(robot: tuple[Origin, str]) -> str:
     origin, sha256 = robot
-    return f"{origin.words} (sha256 {sha256[:12] or 'unknown'})"
+    return f"{origin.command_line} (sha256 {sha256[:12] or 'unknown'})"
 
 
 @dataclass(frozen=True)

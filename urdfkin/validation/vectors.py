@@ -305,7 +305,7 @@ def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFil
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
         sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()
-        head = _Header(name, entry.relative_path.as_posix(), sha256, note=entry.reason)
+        head = _Header(name, entry.relative_path.as_posix(), sha256, note=entry.mimic_problem)
         return _write(folder / file_stem(name), robot, head, frames, samples)
     data, file = robot.urdf.encode(), f"{file_stem(name)}.urdf"
     write_file(folder / file, data)

@@ -2,7 +2,7 @@
 
 Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
 
-    k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
+    k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. Large
@@ -54,11 +54,11 @@ from numpy.typing import NDArray
 from urdfkin.compiled import preload
 from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry, JointMotion, StepField
 from urdfkin.kinematics import lengths as steps
-from urdfkin.kinematics.lengths import State
-from urdfkin.kinematics.number_kinds import Length, counted, norm, product
+from urdfkin.kinematics.lengths import LinkBounds
+from urdfkin.kinematics.number_kinds import Length, magnitude, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
-from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS, of_joints
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS, joint_roundings
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -116,7 +116,7 @@ def magnitudes(
     else:
         _by_kernel(kernel, lengths, inputs, out)
     is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
-    out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
+    out[5] = joint_roundings(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
@@ -126,8 +126,8 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
     for link in lengths.links:
         states.append((_step if rates else _place)(link, states[link.parent + 1], q, *rates))
     for end in lengths.ends:
-        carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
-        for row, values in zip(out, carried, strict=False):
+        bounds = (steps.translate_point if rates else _carried_place)(states[end.step + 1], end.length)
+        for row, values in zip(out, bounds, strict=False):
             row[:, end.frame] = values
 
 
@@ -191,11 +191,11 @@ class _Lengths(NamedTuple):
 def _lengths(plan: CompiledTree) -> _Lengths:
     found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
-        lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
+        lengths, count = magnitude(plan.lengths).tolist(), len(plan.steps)
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
         steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
         links = [
-            _MovingJoint(kind, q, v, parent, length, multiplier, float(counted(offset)))
+            _MovingJoint(kind, q, v, parent, length, multiplier, float(magnitude(offset)))
             for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
@@ -219,7 +219,7 @@ def _norm(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
-def _carried_place(state: State, d: Length) -> State:
+def _carried_place(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
@@ -234,7 +234,7 @@ def _displacement(link: _MovingJoint, q: Any) -> Length:
     return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
-def _place(link: _MovingJoint, state: State, q: Any) -> State:
+def _place(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
     turns = link.kind == JointMotion.TURN
     return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
 
@@ -248,15 +248,15 @@ def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, .
     return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
+def _step(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
     kind, d, at = link.kind, link.length, link.v
     if kind >= JointMotion.PLANAR:
-        slid, *rates = _free_lengths(link, q, v, a)
-        return steps.freed(state, d + slid, *rates)
+        displacement, *rates = _free_lengths(link, q, v, a)
+        return steps.after_free_joint(state, d + displacement, *rates)
     rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
     if kind == JointMotion.SLIDE:
-        return steps.slid(state, d + _displacement(link, q), rate, rate_2)
-    return steps.turned(state, d, rate, rate_2)
+        return steps.after_prismatic(state, d + _displacement(link, q), rate, rate_2)
+    return steps.after_revolute(state, d, rate, rate_2)
 
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
@@ -312,7 +312,8 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
     of the path. Lever arms are therefore at most 2 p long. A conversion to or from the centre of mass adds a
     cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
-    each joint, the bound allows `MUJOCO` = 30 instead of `ROUNDINGS` = 24 rounding errors.
+    each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding
+    errors.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -322,7 +323,7 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
         vel=eq.point_velocity(size.vel, size.w, p),
         alpha=size.alpha,
         acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
-        roundings=2.0 * (MUJOCO / ROUNDINGS) * size.roundings,
+        roundings=2.0 * (MUJOCO_ROUNDINGS / PINOCCHIO_ROUNDINGS) * size.roundings,
     )
 
 
@@ -349,10 +350,10 @@ def true_value_magnitudes(
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of one program with the true values.
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
-    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
-    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The difference
-    of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the axis and
-    the true value have an error of half an eps each. The error of the axis counts twice, because two
+    values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each
+    joint. One program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The
+    difference of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the
+    axis and the true value have an error of half an eps each. The error of the axis counts twice, because two
     rotations use the axis. The conversion of two kinds of numbers causes larger errors:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
@@ -380,7 +381,7 @@ def true_value_magnitudes(
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
     """
-    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
+    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE)
     more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
     return replace(size, roundings=size.roundings + more)
 
@@ -583,8 +584,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
-    contains. For this additional joint, the bound allows at least `ROUNDINGS` = 24 eps, so the bound covers
-    the 13 eps.
+    contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the
+    bound covers the 13 eps.
 
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
@@ -625,7 +626,7 @@ def nearest_singularity(plan: CompiledTree) -> float:
 
     At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
     """
-    return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
+    return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:

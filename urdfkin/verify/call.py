@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, NotFiniteError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.configuration import checked, numbers, shaped
-from urdfkin.model.configuration_like import Given, by_name
+from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
+from urdfkin.model.configuration import parse_and_normalise, parse_finite, parse_numbers
+from urdfkin.model.configuration_like import ConfigurationLike, as_text_or_mapping
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import OracleQuery, QueryBatch
@@ -58,15 +58,15 @@ class Call:
         frame: str | Sequence[str],
         reference: Reference | str,
         base: BaseMotion | None,
-        given: Sequence[Given],
+        given: Sequence[ConfigurationLike],
         also: Sequence[str] = (),
         **options: object,
     ) -> None:
         if base is not None and not isinstance(base, BaseMotion):
             raise InputError("base must be a BaseMotion or None", found=type(base).__name__)
-        named = [by_name(x, name) for x, name in zip(given, "qva", strict=False)]
+        named = [as_text_or_mapping(x, name) for x, name in zip(given, "qva", strict=False)]
         inputs: list[ArrayLike] = [
-            cast("ArrayLike", x) if by is None else numbers(tree, by, name)
+            cast("ArrayLike", x) if by is None else parse_numbers(tree, by, name)
             for x, by, name in zip(given, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
@@ -76,12 +76,12 @@ class Call:
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
-        arrays = [shaped(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
+        arrays = [parse_and_normalise(tree, x, name) for x, name in zip(inputs, "qva", strict=False)]
         self.shape = self._batch_shape(arrays)
         self.n = math.prod(self.shape)
         flat = [self._flat_input(array) for array in arrays]
         self.q, *self.rates = flat
-        self.state = STILL_STATE if base is None else base.state(self.shape)
+        self.state = FIXED_BASE_STATE if base is None else base.state(self.shape)
 
     def _batch_shape(self, given: list[FloatArray]) -> tuple[int, ...]:
         shapes = [array.shape[:-1] for array in given]
@@ -144,7 +144,7 @@ class Call:
             return evaluate(*arguments, **options)
         except NotFiniteError:
             for x, name in zip(self.inputs, "qva", strict=False):
-                checked(self.tree, x, name)
+                parse_finite(self.tree, x, name)
             raise
 
     def part(self, part: slice | IntArray) -> Part:

@@ -30,12 +30,19 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, ROW, of_joints, of_rows, of_rows_read_back
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.kinematics.roundings import (
+    EPS,
+    LEAST_UNIT,
+    ROW_ROUNDINGS,
+    joint_roundings,
+    read_back_roundings,
+    table_roundings,
+)
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointFrame, JointKind, KinematicTree, LinkFrame
-from urdfkin.urdf.foreign import Modelled
+from urdfkin.urdf.foreign import ConvertedModel
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.comparison import compare
@@ -84,7 +91,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     metres = float(off[..., 3].max(initial=0.0))
     turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
     ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
-    unit = EPS * float(of_joints(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
+    unit = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
     length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
     slides = values[:, [not joint.kind.turns for joint in path.joints]]
     length += np.abs(slides).sum(axis=-1).max(initial=0.0)
@@ -120,12 +127,12 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     coordinates = screws.coupling.select(verifier.tree, q)
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
-    path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
+    path = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
     # Pinocchio computes the placements of the base and the tip relative to the root.
     # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
-    unit = EPS * (of_joints(joints) + size) + left_out(path)
+    unit = EPS * (joint_roundings(joints) + size) + left_out(path)
     allowed = screws.rounding(coordinates) + unit * (lever + size)
     share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
@@ -185,7 +192,7 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
     )
 
 
-def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
+def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
     """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
 
     Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
@@ -196,10 +203,10 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
     # The factor 2 in the bound allows for the rounded angles in the URDF text.
-    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
+    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(
@@ -214,7 +221,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     )
 
 
-def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
+def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     """Return the model's placements (n, joints + frames, 4, 4)."""
     pin = pinocchio()
     data = model.createData()
@@ -253,8 +260,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     off = np.abs(theirs - table.placement(own))[:, :3]
     # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
-    turn = EPS * of_rows_read_back(rows) + defect
-    allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
+    turn = EPS * read_back_roundings(rows) + defect
+    allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
         raise TableError(
             "the URDF made from a table differs from the table",

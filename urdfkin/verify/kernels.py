@@ -27,8 +27,8 @@ from urdfkin.compiled.machine.compiling import (
 from urdfkin.compiled.machine.memory import fetch, numbers_at
 from urdfkin.compiled.plan import JointMotion
 from urdfkin.kinematics import lengths as steps
-from urdfkin.kinematics.arithmetic import bound, rebound
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
+from urdfkin.kinematics.arithmetic import bind_equations, rebind_functions
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
 
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
@@ -171,7 +171,7 @@ def _sum(x, y):
 @helper()
 def _product(x, y):
     """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` does."""
-    return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
+    return SMALLEST_NORMAL if x * y < SMALLEST_NORMAL and x != 0.0 and y != 0.0 else x * y
 
 
 @helper()
@@ -187,9 +187,11 @@ _LENGTHS = {
 }
 # Numba can call functions that are attributes of a module.
 _EQUATIONS: Any = ModuleType("length_equations")
-vars(_EQUATIONS).update(vars(bound(decorate=helper(), **_LENGTHS)))
-_STEPS = rebound(steps, decorate=helper(), others={"eq": _EQUATIONS})
-_carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
+vars(_EQUATIONS).update(vars(bind_equations(decorate=helper(), **_LENGTHS)))
+_STEPS = rebind_functions(steps, decorate=helper(), replacements={"eq": _EQUATIONS})
+_translate_point, _after_revolute, _after_prismatic, _after_free_joint = (
+    _STEPS[name] for name in ("translate_point", "after_revolute", "after_prismatic", "after_free_joint")
+)
 
 
 @helper()
@@ -221,14 +223,14 @@ def _read(x, first, m, at, factor, to):
 @helper()
 def _over_turn(before, after, m, d, rates):
     for i in range(m):
-        _put(after, i, _turned(_state(before, i), d, rates[0, i], rates[1, i]))
+        _put(after, i, _after_revolute(_state(before, i), d, rates[0, i], rates[1, i]))
 
 
 @helper()
 def _over_slide(before, after, m, d, constant, rates):
     for i in range(m):
         length = d + (rates[2, i] + constant)
-        _put(after, i, _slid(_state(before, i), length, rates[0, i], rates[1, i]))
+        _put(after, i, _after_prismatic(_state(before, i), length, rates[0, i], rates[1, i]))
 
 
 @helper()
@@ -236,7 +238,7 @@ def _over_free(before, after, first, m, d, free, at):
     step = 1 if len(free) > 1 else 0
     for i in range(m):
         displacement, o, u, o_rate, u_rate = _of_row(free, (first + i) * step, at)
-        _put(after, i, _freed(_state(before, i), d + displacement, o, u, o_rate, u_rate))
+        _put(after, i, _after_free_joint(_state(before, i), d + displacement, o, u, o_rate, u_rate))
 
 
 @kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
@@ -280,7 +282,7 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
             before = s[ends[f, 0] + 1]
             for i in range(m):
                 at = (first + i) * frames + ends[f, 1]
-                state = _carried(_state(before, i), tips[f])
+                state = _translate_point(_state(before, i), tips[f])
                 for j in range(_STATE):
                     out[j * n * frames + at] = state[j]
     return 0

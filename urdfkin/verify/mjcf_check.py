@@ -23,12 +23,12 @@ import numpy as np
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
 from urdfkin.errors.escape import printable
-from urdfkin.kinematics.roundings import EPS, MJCF_RULE
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.kinematics.roundings import EPS, MJCF_RULE_ROUNDINGS
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.mjcf import Listed, is_text, name_of
+from urdfkin.urdf.mjcf import MjcfRemark, is_text, source_name
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
 from urdfkin.verify.comparison import worst_of_each
@@ -53,7 +53,7 @@ class MjcfReading:
     """
 
     urdf: str
-    listed: tuple[Listed, ...]
+    listed: tuple[MjcfRemark, ...]
     path: str | None
     answer: Mapping[str, Any]
     not_whole: str | None
@@ -70,7 +70,7 @@ def read_mjcf(
     joint.
     """
     version()
-    name = name_of(source)
+    name = source_name(source)
     text = isinstance(source, bytes) or is_text(source)
     path = None if text else str(at_home(os.fspath(source)))  # type: ignore[arg-type]
     request = {
@@ -92,7 +92,7 @@ def read_mjcf(
     reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
         read[-1]["urdf"],
-        tuple(Listed(*one) for one in read[-1]["listed"]),
+        tuple(MjcfRemark(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
         None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_QUOTED],
@@ -125,9 +125,9 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     q = unpacked(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
     # The factor 2 allows for the rounded angles in the URDF text.
-    size = mujoco_magnitudes(magnitudes(plan, q, None, None, STILL_STATE))
+    size = mujoco_magnitudes(magnitudes(plan, q, None, None, FIXED_BASE_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))
@@ -166,7 +166,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     columns = sorted(rules)
     residuals, sizes = residuals[:, columns], sizes[:, columns]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.abs(residuals) / (MJCF_RULE * EPS * sizes)
+        share = np.abs(residuals) / (MJCF_RULE_ROUNDINGS * EPS * sizes)
     share = np.where(residuals == 0.0, 0.0, share)
     if not (share <= 1.0).all():
         k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)

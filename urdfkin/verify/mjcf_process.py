@@ -27,9 +27,9 @@ import numpy as np
 from urdfkin.errors import InputError, InstallationError, OracleError, UrdfkinError
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray
-from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.confinement import MAX_MEMORY, limit_process
 from urdfkin.urdf.mjcf import Mjcf, read_mjcf
-from urdfkin.urdf.mujoco import library
+from urdfkin.urdf.mujoco import import_mujoco
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio import pinocchio
 
@@ -39,18 +39,18 @@ _NAMED = 5
 #: Maximum size of the output of a process, bytes.
 MOST = 400_000_000
 
-_TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
     request = json.load(sys.stdin)
     try:
         # Without a warning function, MuJoCo writes a log file.
-        library().set_mju_user_warning(lambda message: None)
+        import_mujoco().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
-        limit(request["seconds"])
+        limit_process(request["seconds"])
         for answer in answers(request):
             write_answer(answer)
     except Exception as error:
@@ -108,13 +108,13 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     read = read_mjcf(source, request["name"])
     q = _configurations(read, samples)
     yield _answer(read, q)
-    if samples or read.aligns:
+    if samples or read.aligns_free_bodies:
         try:
-            whole = read_mjcf(source, request["name"], whole=True)
+            whole = read_mjcf(source, request["name"], with_shapes=True)
             q = _configurations(whole, samples)
             yield _answer(whole, q)
             read = whole
-        except (MemoryError, InputError, library().FatalError) as error:
+        except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo compiles the file, but the result is not a tree.
             found = error.found if isinstance(error, InputError) else str(error)
@@ -133,20 +133,20 @@ def _configurations(read: Mjcf, samples: int) -> FloatArray:
 def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
     answer: dict[str, Any] = {
         "urdf": to_urdf(read.tree),
-        "listed": [astuple(one) for one in read.listed],
-        "whole": read.whole,
+        "listed": [astuple(one) for one in read.remarks],
+        "whole": read.with_shapes,
         "frames": [(name, kind) for name, (kind, _) in read.frames.items()],
-        "rules": [(i, name) for i, name in read.rules.items()],
-        "apart": sorted(read.apart),
+        "rules": [(i, name) for i, name in read.mimic_equalities.items()],
+        "apart": sorted(read.other_equalities),
     }
     if len(q):
         answer |= {
             "q": packed(q),
             "placements": packed(read.placements(q)[..., :3, :]),
-            "lengths": packed(read.lengths(q)),
+            "lengths": packed(read.distance_bounds(q)),
             "angles": packed(read.reference_angles(q)),
             "residuals": packed(read.residuals(q)),
-            "rule_sizes": packed(read.rule_sizes(q)),
+            "rule_sizes": packed(read.rule_scales(q)),
         }
     return answer
 
@@ -164,7 +164,7 @@ def unpacked(found: Mapping[str, Any]) -> FloatArray:
 def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
     bodies = [name for name, (kind, i) in read.frames.items() if kind == "body" and i]
     try:
-        placed = _pinocchio_placements(path, read.qpos(q), read.coordinates, bodies)
+        placed = _pinocchio_placements(path, read.qpos(q), read.qpos_index, bodies)
     except (OracleError, InstallationError) as error:
         return {"error": str(error)}
     return {"bodies": bodies, "placements": packed(placed[..., :3, :])}

@@ -32,7 +32,7 @@ from urdfkin.errors import OracleError
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.urdf.mujoco import compiled, library
+from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 from urdfkin.verify.oracle import (
     WORLD,
     Frames,
@@ -89,7 +89,7 @@ class MujocoOracle(Oracle):
 
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
         super().__init__(text, tree, **how)
-        self._mujoco, self.nv = library(), tree.nv
+        self._mujoco, self.nv = import_mujoco(), tree.nv
         if (depth := depth_of(tree)) > _DEEPEST:
             raise OracleError(
                 f"MuJoCo checks chains of up to {_DEEPEST:,} links",
@@ -137,7 +137,7 @@ class MujocoOracle(Oracle):
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            return _with_mass_at_root(compiled(spec), self._bodies[root])
+            return _with_mass_at_root(compile_spec(spec), self._bodies[root])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
             raise OracleError(

@@ -371,7 +371,7 @@ def replay_line(
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
     """
-    words = ["urdfkin", command, origin.words, "--frame", shlex.quote(frame)]
+    words = ["urdfkin", command, origin.command_line, "--frame", shlex.quote(frame)]
     if reference:
         words += ["--reference", reference]
     for letter, numbers in values.items():

@@ -82,7 +82,7 @@ def second_reading(
         words = " ".join(str(error).split()) or "no message"
         return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
     ours = {
-        joint.name: (joint.unlocked, tree.links[joint.parent], tree.links[i + 1])
+        joint.name: (joint.original, tree.links[joint.parent], tree.links[i + 1])
         for i, joint in enumerate(tree.joints)
         if i >= root_joint
     }

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.kinematics.roundings import EPS, SMALLEST
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
@@ -231,7 +231,7 @@ def singular_values(
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.abs(A - (U * s[..., np.newaxis, :]) @ Vt)
         sizes = np.abs(A) + (np.abs(U) * s[..., np.newaxis, :]) @ np.abs(Vt)
-        residual = _norm(left + terms * (EPS * sizes + SMALLEST) + off)
+        residual = _norm(left + terms * (EPS * sizes + SMALLEST_NORMAL) + off)
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]

@@ -38,8 +38,8 @@ from urdfkin.dh.motion import acceleration, jacobian
 from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
-from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints, of_rows
-from urdfkin.model.chain import chain
+from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
+from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -189,7 +189,7 @@ def _measured(
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
+    return float((found / np.maximum(unit, MIN_DIVISOR)).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,8 +280,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
-    counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
-    rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
+    counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
+    rounding = EPS * counted + left_out(make_chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 

@@ -26,34 +26,26 @@ import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
-from urdfkin.kinematics.rotation import rotation_of
-from urdfkin.kinematics.roundings import SINGLE
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import WIDEST
-from urdfkin.model.tree import (
-    FloatArray,
-    Joint,
-    JointKind,
-    KinematicTree,
-    LinkFrame,
-    inverse,
-    is_bounded,
-    pose,
-)
+from urdfkin.kinematics.rotation import rotation_from_quaternion
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import largest_value
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame, inverse, pose
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.usd import Remark, version
+from urdfkin.urdf.usd import UsdRemark, version
 from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 PATIENCE = 60.0
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_check_joint`).
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in
+#: `_check_joint`).
 _ROTATION = 18.0
 #: Number of rounding errors in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE`.
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE_ROUNDOFF`.
 #: `_compare_prims` derives this bound.
 _TRANSFORM = 6.0 * np.pi
 
@@ -63,7 +55,7 @@ class UsdReading:
     """The tree of a USD stage as a URDF text, and the answer of the process that read the stage."""
 
     urdf: str
-    remarks: tuple[Remark, ...]
+    remarks: tuple[UsdRemark, ...]
     path: str
     answer: Mapping[str, Any]
 
@@ -104,10 +96,10 @@ def read_usd(
             remedy="check that the file is complete",
         )
     answer = answers[-1]
-    return UsdReading(answer["urdf"], tuple(Remark(*one) for one in answer["remarks"]), str(path), answer)
+    return UsdReading(answer["urdf"], tuple(UsdRemark(*one) for one in answer["remarks"]), str(path), answer)
 
 
-def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
+def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
     Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
@@ -125,7 +117,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
     """Compare urdfkin's and OpenUSD's data of a joint; return the largest ratio of a difference to its bound.
 
-    Let u = `SINGLE` be the relative error of one rounding to single precision.
+    Let u = `SINGLE_ROUNDOFF` be the relative error of one rounding to single precision.
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
@@ -141,13 +133,13 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     for p, quaternion in ((3, 4), (5, 6)):
         off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
         if off > 0.0:
-            shares.append(off / (_ORIGIN * SINGLE * size) if size else np.inf)
-        R = rotation_of(ours[quaternion]).T @ rotation_of(theirs[quaternion])
-        shares.append(_angle(R) / (_ROTATION * SINGLE))
+            shares.append(off / (_ORIGIN * SINGLE_ROUNDOFF * size) if size else np.inf)
+        R = rotation_from_quaternion(ours[quaternion]).T @ rotation_from_quaternion(theirs[quaternion])
+        shares.append(_angle(R) / (_ROTATION * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
         finite = abs(a) < np.inf
         if finite and a != b:
-            shares.append(abs(a - b) / (SINGLE * abs(a)) if a else np.inf)
+            shares.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a else np.inf)
     if not max(shares) <= 1.0:
         raise _error(f"{name}, joint {path}", f"{max(shares):.3g} times the bound of single precision")
     return max(shares)
@@ -168,7 +160,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single_precision`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -216,35 +208,31 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
       joint's constant offset plus the lengths of the two origins.
     - Joint without an entry in `single`: no rounding errors.
     """
-    of_links, of_joints = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
+    of_links, joint_roundings = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
         way, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
         if joint.lock:
             lever = size + joint.length
-        of_joints[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
+        joint_roundings[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
-            length += _largest(joint)
+            length += largest_value(joint.limit)
         if joint.mimic is not None:
             rule, leader = joint.mimic, tree.joints[tree.joint_index(joint.mimic.leader)]
-            off = share * (abs(rule.multiplier) * _largest(leader) + abs(rule.offset))
+            off = share * (abs(rule.multiplier) * largest_value(leader.limit) + abs(rule.offset))
             way, angle = (way + off, angle) if slides else (way, angle + off)
         parent_way, parent_angle = of_links[joint.parent]
         of_links[i + 1] = parent_way + way + (parent_angle + angle) * length, parent_angle + angle
-    return SinglePrecision(of_links, of_joints)
+    return SinglePrecision(of_links, joint_roundings)
 
 
-def _largest(joint: Joint) -> float:
-    return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
-
-
-def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
+def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
     The bound assumes that a prim's transform consists of several operations: one operation for each joint on
-    the path from the root, and one more. With u = `SINGLE`, the angle error of one operation is at most
-    `_TRANSFORM` u, the largest of these three values:
+    the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at
+    most `_TRANSFORM` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
@@ -260,7 +248,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)[0]
     # The root's pose in the stage is arbitrary, so all poses become relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
@@ -274,8 +262,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         depth = len(tree.path(link)) + 1
         off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
         angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
-        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE
-        length = of_links[link, 0] + depth * SINGLE * (1.0 + _TRANSFORM) * 2.0 * far
+        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE_ROUNDOFF
+        length = of_links[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM) * 2.0 * far
         share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
         shares.append(share)
         worst = max(worst[0], off), max(worst[1], angle)
@@ -285,7 +273,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
                 f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(
-                Remark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
+                UsdRemark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
             )
     moved = (
         int(np.count_nonzero(np.abs(q) > 0.0)) if not any(joint.kind.nq > 1 for joint in tree.joints) else 0

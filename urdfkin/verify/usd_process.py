@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.urdf.confinement import limit
-from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
+from urdfkin.urdf.confinement import limit_process
+from urdfkin.urdf.usd import Usd, UsdJoint, import_openusd, read_usd
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.mjcf_process import error_answer, packed, write_answer
 
@@ -29,8 +29,8 @@ def serve() -> None:
     request = json.load(sys.stdin)
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # A confined process cannot start threads.
     try:
-        library()
-        limit(request["seconds"])
+        import_openusd()
+        limit_process(request["seconds"])
         write_answer(answer_of(request))
     except Exception as error:
         write_answer(error_answer(error, "OpenUSD cannot read this stage"))
@@ -47,10 +47,10 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
     )
     return {
         "urdf": to_urdf(read.tree),
-        "single": read.single,
+        "single": read.single_precision,
         "remarks": [astuple(one) for one in read.remarks],
         "prims": read.prims,
-        "rest": packed(read.rest[:, :3]),
+        "rest": packed(read.rest_poses[:, :3]),
         "rest_q": read.rest_q.tolist(),
         "joints": _second_reading(read),
     }
@@ -58,7 +58,7 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
 
 def _second_reading(read: Usd) -> dict[str, Any]:
     """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
-    pxr = library()
+    pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
     with warnings.catch_warnings():
@@ -74,22 +74,22 @@ def _second_reading(read: Usd) -> dict[str, Any]:
 
 
 def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
-    """Return `JointReading.as_list` for a joint that OpenUSD's parser has read."""
+    """Return `UsdJoint.as_list` for a joint that OpenUSD's parser has read."""
     frames = []
     for i in (0, 1):
         p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
-        frames.append((np.array(p, float) * read.unit, xyzw / np.linalg.norm(xyzw)))
+        frames.append((np.array(p, float) * read.meters_per_unit, xyzw / np.linalg.norm(xyzw)))
     free = _freedoms(physics, one)
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
         ends = own.get(free.lower())  # `ends` is None if the joint has several free directions.
-    factor = np.pi / 180.0 if free.startswith("rot") else read.unit
+    factor = np.pi / 180.0 if free.startswith("rot") else read.meters_per_unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
     )
-    return JointReading(free, str(one.body0), str(one.body1), *frames[0], *frames[1], limits, 0.0).as_list()
+    return UsdJoint(free, str(one.body0), str(one.body1), *frames[0], *frames[1], limits, 0.0).as_list()
 
 
 def _freedoms(physics: Any, one: Any) -> str:

@@ -17,9 +17,9 @@ from urdfkin.compiled import preload
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, OracleError, RangeError, warn_caller
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.configuration import draw, warn_of_degrees
+from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings
+from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
+from urdfkin.model.configuration import draw_samples, warn_of_degrees
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
@@ -169,7 +169,7 @@ class Verifier:
     def certificate(self) -> Certificate:
         return replace(
             self.ledger.certificate(self.tree.name, self.library.words),
-            reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
+            reading="; ".join(filter(None, (self.reading, self.origin.locks_text))),
             source=self.origin.source,
             sha256=self.sha256,
             urdfkin=own_version(),
@@ -233,7 +233,7 @@ class Verifier:
                 return None
             rows = tuple(x[np.newaxis] for x in arguments[:-1])
             query = QueryBatch(frames, rows, reference)
-            x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, query)
+            x = Part(plan, reference, rows[0], rows[1:], FIXED_BASE_STATE, query)
             ours = result[np.newaxis, np.newaxis]
             theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
             comparison = compare(ours, theirs, bound, 2)
@@ -290,7 +290,7 @@ class Verifier:
         if (query := call.question.rows(np.array([k])).base) is not None:
             fields = query.placement, query.velocity, query.acceleration
             words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
-        return f"{self.origin.python}.{quantity.method}({', '.join(words)})"
+        return f"{self.origin.python_call}.{quantity.method}({', '.join(words)})"
 
     # -- tables --------------------------------------------------------------------------------------
 
@@ -304,7 +304,7 @@ class Verifier:
         if (reason := self.cannot()) is not None:
             _warn(reason)
             return None
-        drawn = draw(self.tree, samples, np.random.default_rng(0), with_special=True)
+        drawn = draw_samples(self.tree, samples, np.random.default_rng(0), with_special=True)
         check = check_table(self.oracle(), self.tree, table, drawn)
         if not check.agrees:
             raise TableError(
@@ -329,13 +329,13 @@ class Verifier:
             _warn(reason)
             return None
         tree = self.tree
-        q = draw(tree, TABLE_SAMPLES, np.random.default_rng(0), with_special=True).q
+        q = draw_samples(tree, TABLE_SAMPLES, np.random.default_rng(0), with_special=True).q
         ours = parameters.placements(q)
         theirs = self.oracle().placements(QueryBatch(tree.link_frames[1:], (q,)))
         error = np.abs(ours - theirs)[..., :3, :]
         reach = parameters.reach(q)
         units = max(
-            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, NOT_ZERO)).max(initial=0.0)),
+            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, MIN_DIVISOR)).max(initial=0.0)),
             float(error[..., :3].max(initial=0.0)) / EPS,
         )
         line = (
@@ -343,7 +343,7 @@ class Verifier:
             f" {error[..., 3].max(initial=0.0):.2e} m, {units:.2g} eps*scale"
         )
         tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
-        if units > parameters.roundings + of_joints(0, tilt):
+        if units > parameters.roundings + joint_roundings(0, tilt):
             raise TableError(
                 f"the tree parameters of {tree.name} disagree with Pinocchio",
                 where=f"Pinocchio {version()}",
@@ -395,7 +395,7 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
     Jacobian on a fixed base, such a path has one bound for all configurations.
     """
     v, a = (*x.rates, None, None)[:2]
-    constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
+    constant = v is None and x.state is FIXED_BASE_STATE and x.plan.turns_only and len(x.q) > 0
     key = "bound", quantity.name, x.reference, by.name
     bound: Bound | None = x.plan.cache.get(key) if constant else None
     if bound is None:

@@ -159,7 +159,7 @@ def _draw_coordinates(
     """Draw the coordinates that change, or all if none changes, and their limits (thin lines)."""
     del x
     values: FloatArray = getattr(trajectory, what)
-    names = robot.coordinate_names if what == "q" else robot.rate_names
+    names = robot.coordinate_names if what == "q" else robot.velocity_names
     moves = [i for i in indices if (values[:, i] != values[0, i]).any()] or list(indices)
     outside = {i: mask for i in moves if (mask := _outside(robot, what, i, values[:, i])).any()}
     named = moves if len(moves) <= _MOST_NAMES else [i for i in moves if i in outside]

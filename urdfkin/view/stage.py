@@ -243,8 +243,8 @@ class Stage:
                 add(f"{i + 1}/joint{i}", joint.axis, 0.6 * r, 3.4 * r, _SLIDE, p0)
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
-        of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
-        words = tree.links if kind == "links" else ("", *of_joints)
+        joint_roundings = [joint.name if joint.kind.nv else "" for joint in tree.joints]
+        words = tree.links if kind == "links" else ("", *joint_roundings)
         return [
             self._scene.add_label(
                 f"/robot/{i}/{kind}",

@@ -15,8 +15,8 @@ import numpy as np
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.errors.escape import markdown_text, printable
-from urdfkin.model.configuration import checked, degrees_lines
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration import degrees_messages, parse_finite
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.conventions import Conversion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint
@@ -187,7 +187,7 @@ def velocity_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
             if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED:
                 most = joint.limit.velocity
             turns = k >= 3 if joint.nv == 6 else _is_angle(joint, k)
-            rows.append(SliderRow(at + k, robot.rate_names[at + k], turns, -most, most))
+            rows.append(SliderRow(at + k, robot.velocity_names[at + k], turns, -most, most))
     return rows
 
 
@@ -286,14 +286,14 @@ class Viewer:
         self,
         server: Any,
         robot: Robot,
-        q: Given | None = None,
+        q: ConfigurationLike | None = None,
         trajectory: Trajectory | None = None,
         conversion: Conversion | None = None,
     ) -> None:
         self.server, self.robot, self._conversion = server, robot, conversion
         self.stage = Stage(server, robot)
         self._start = within_limits(robot, robot.neutral())
-        self.q = self._start if q is None else checked(robot.tree, q, "q").copy()
+        self.q = self._start if q is None else parse_finite(robot.tree, q, "q").copy()
         self.v, self.a = np.zeros(robot.nv), np.zeros(robot.nv)
         self._rng = np.random.default_rng(0)
         self._table: DHTable | None = None
@@ -410,9 +410,9 @@ class Viewer:
                 self._write_q()
             self.update()
 
-    def set_q(self, q: Given) -> None:
+    def set_q(self, q: ConfigurationLike) -> None:
         with self._lock:
-            self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
+            self.set_state(parse_finite(self.robot.tree, q, "q"), self.v, self.a)
 
     def set_velocities(self, v: FloatArray, a: FloatArray) -> None:
         with self._lock:
@@ -451,15 +451,15 @@ class Viewer:
             try:
                 text = self.words_of_q.value
                 if self._conversion is not None:
-                    q = self._conversion.from_(self._conversion.layout("q").read(text))
+                    q = self._conversion.from_(self._conversion.layout("q").parse(text))
                 else:
-                    q = checked(self.robot.tree, text, "q", look=False)
+                    q = parse_finite(self.robot.tree, text, "q", warn=False)
                 self.q = q.copy()
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
             # The text field keeps the text that the user typed.
-            self.wrong.content = markdown_text("; ".join(degrees_lines(self.robot.tree, self.q)))
+            self.wrong.content = markdown_text("; ".join(degrees_messages(self.robot.tree, self.q)))
             self.sliders.show(self.q)
             self.update()
 
@@ -513,7 +513,7 @@ class Viewer:
         return frame_motion(self.robot, (q, v, a), self.frame.value, reference)
 
     def _draw(self, x: FrameMotion) -> None:
-        stage, reach, rates = self.stage, self.stage.reach, self.robot.rate_names
+        stage, reach, rates = self.stage, self.stage.reach, self.robot.velocity_names
         columns, ellipsoid = self.columns.value, self.ellipsoid.value
         stage.draw_arrows(
             "jacobian",

@@ -26,7 +26,12 @@ from urdfkin.kinematics.bodies import (
     velocity_of_pose_rates,
 )
 from urdfkin.kinematics.inputs import FloatArray
-from urdfkin.kinematics.rotation import SEQUENCES, exp_rotation, rotation_from_euler, rotation_of
+from urdfkin.kinematics.rotation import (
+    EULER_SEQUENCES,
+    exp_rotation,
+    rotation_from_euler,
+    rotation_from_quaternion,
+)
 
 
 def test_the_motion_of_composed_frames_is_the_derivative_of_the_product_of_transformations() -> None:
@@ -85,7 +90,7 @@ def test_the_derivative_of_a_planar_rotation_is_the_rotation_by_a_further_right_
 
 
 R = exp_rotation([0.5, -0.8, 0.3])
-REPRESENTATIONS = (*SEQUENCES, "quaternion")
+REPRESENTATIONS = (*EULER_SEQUENCES, "quaternion")
 
 
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
@@ -119,7 +124,7 @@ def test_the_representation_matrix_of_a_quaternion_has_a_right_inverse_at_every_
         turned = exp_rotation([0.0, angle, 0.0])
         product = representation_matrix("quaternion", turned) @ representation_inverse("quaternion", turned)
         assert np.abs(product - np.eye(6)).max() <= ROUNDING
-    assert np.abs(rotation_of(orientation_of("quaternion", R)) - R).max() <= ROUNDING
+    assert np.abs(rotation_from_quaternion(orientation_of("quaternion", R)) - R).max() <= ROUNDING
 
 
 def test_at_a_representation_singularity_the_jacobian_is_refused_with_the_distance() -> None:

@@ -13,7 +13,7 @@ from tests.kinematics.rotation.strategies import ROUNDING, angles, axes, vectors
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import (
-    SEQUENCES,
+    EULER_SEQUENCES,
     add_angular_velocities,
     angular_velocity_from_euler_rates,
     angular_velocity_from_quaternion_rates,
@@ -29,7 +29,7 @@ from urdfkin.kinematics.rotation import (
     quaternion_rates,
     rotation_about,
     rotation_from_euler,
-    rotation_of,
+    rotation_from_quaternion,
     singularity_distance,
 )
 
@@ -62,7 +62,7 @@ def moving(name: str) -> Callable[[Any], Any]:
     return R
 
 
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 def test_euler_rates_and_angular_velocity_can_be_converted_both_ways(name: str) -> None:
     w = array(angular_velocity(moving(name), 0.0))
     assert np.abs(angular_velocity_from_euler_rates(name, ANGLES, RATES) - w).max() <= 2 * ROUNDING
@@ -70,7 +70,7 @@ def test_euler_rates_and_angular_velocity_can_be_converted_both_ways(name: str) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.tuples(angles, st.floats(0.2, 1.3), angles))
 def test_the_closed_form_inverse_of_the_euler_rate_matrix_is_correct(
@@ -81,7 +81,7 @@ def test_the_closed_form_inverse_of_the_euler_rate_matrix_is_correct(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.floats(-4.0, 4.0))
 def test_the_condition_number_is_that_of_the_euler_rate_matrix(name: str, middle: float) -> None:
@@ -180,7 +180,7 @@ def error(steps: int) -> float:
         wobble, quaternion_of(rotation_from_euler("ZYZ", zyz(0.0))), np.linspace(0, 2, steps + 1)
     )
     assert np.abs(np.linalg.norm(quats, axis=-1) - 1.0).max() <= ROUNDING
-    missed = rotation_of(quats[-1]).T @ rotation_from_euler("ZYZ", zyz(2.0))
+    missed = rotation_from_quaternion(quats[-1]).T @ rotation_from_euler("ZYZ", zyz(2.0))
     return float(np.linalg.norm(log_rotation(missed)))
 
 
@@ -197,4 +197,4 @@ def test_angular_velocity_in_the_body_frame_integrates_to_the_same_orientation()
 
     start = quaternion_of(rotation_from_euler("ZYZ", zyz(0.0)))
     quat = integrate_orientation(in_body, start, np.linspace(0, 2, 401), "body")[-1]
-    assert np.abs(rotation_of(quat) - rotation_from_euler("ZYZ", zyz(2.0))).max() < 1e-8
+    assert np.abs(rotation_from_quaternion(quat) - rotation_from_euler("ZYZ", zyz(2.0))).max() < 1e-8

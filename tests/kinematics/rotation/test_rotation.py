@@ -13,23 +13,23 @@ from tests.kinematics.rotation.strategies import ROUNDING, angles, axes, vectors
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.inputs import FloatArray, determinant
 from urdfkin.kinematics.rotation import (
-    SEQUENCES,
+    EULER_SEQUENCES,
     add_angular_velocities,
     angular_velocity_of,
-    axis_aligning,
     axis_angle_of,
-    conjugate,
+    conjugate_quaternion,
     euler_of,
     exp_rotation,
     integrate_orientation,
     log_rotation,
-    multiply,
+    multiply_quaternions,
     quaternion_of,
     quaternion_rate_matrix,
     rotation_about,
     rotation_from_euler,
+    rotation_from_quaternion,
     rotation_from_rpy,
-    rotation_of,
+    rotation_with_z_axis,
     rpy_of,
     skew,
     unskew,
@@ -94,7 +94,7 @@ def test_the_axis_of_a_half_turn_is_recovered() -> None:
 @pytest.mark.slow
 @given(axes)
 def test_the_z_axis_of_the_aligning_rotation_is_the_given_axis(axis: FloatArray) -> None:
-    R = axis_aligning(axis)
+    R = rotation_with_z_axis(axis)
     assert np.array_equal(R[:, 2], axis + 0.0)
     assert np.abs(R @ R.T - np.eye(3)).max() <= ROUNDING
     assert abs(float(determinant(R)) - 1.0) <= ROUNDING
@@ -102,10 +102,10 @@ def test_the_z_axis_of_the_aligning_rotation_is_the_given_axis(axis: FloatArray)
 
 def test_coordinate_axes_are_aligned_without_rounding() -> None:
     axes_both_ways = np.vstack((np.eye(3), -np.eye(3)))
-    Rs = axis_aligning(axes_both_ways)
+    Rs = rotation_with_z_axis(axes_both_ways)
     assert np.isin(Rs, (-1.0, 0.0, 1.0)).all()
     assert np.array_equal(Rs[:, :, 2], axes_both_ways)
-    assert np.array_equal(axis_aligning([0.0, 0.0, 1.0]), np.eye(3))
+    assert np.array_equal(rotation_with_z_axis([0.0, 0.0, 1.0]), np.eye(3))
 
 
 # -- rotations and angles in all 24 sequences ------------------------------------------------------
@@ -115,12 +115,12 @@ three_angles = st.tuples(angles, angles, angles)
 
 
 def test_there_are_twelve_sequences_about_moving_axes_and_twelve_about_fixed_axes() -> None:
-    assert len(set(SEQUENCES)) == 24
-    assert sum(name.isupper() for name in SEQUENCES) == 12
+    assert len(set(EULER_SEQUENCES)) == 24
+    assert sum(name.isupper() for name in EULER_SEQUENCES) == 12
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
 def test_a_rotation_from_euler_angles_agrees_with_scipy(name: str, turns: tuple[float, float, float]) -> None:
@@ -129,7 +129,7 @@ def test_a_rotation_from_euler_angles_agrees_with_scipy(name: str, turns: tuple[
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
 def test_euler_angles_of_a_rotation_reproduce_the_rotation_even_at_the_singularity(
@@ -142,7 +142,7 @@ def test_euler_angles_of_a_rotation_reproduce_the_rotation_even_at_the_singulari
     assert low <= found[1] <= high
 
 
-@pytest.mark.parametrize("name", SEQUENCES)
+@pytest.mark.parametrize("name", EULER_SEQUENCES)
 def test_angles_within_the_range_are_recovered(name: str) -> None:
     middle = 1.1 if name[0] == name[2] else -0.7
     assert (
@@ -187,7 +187,7 @@ def test_quaternion_and_rotation_matrix_can_be_converted_both_ways(axis: FloatAr
     R = rotation_about(axis, angle)
     quat = quaternion_of(R)
     assert quat[3] >= 0.0
-    assert np.abs(rotation_of(quat) - R).max() <= ROUNDING
+    assert np.abs(rotation_from_quaternion(quat) - R).max() <= ROUNDING
     assert np.abs(Rotation.from_quat(quat).as_matrix() - R).max() <= ROUNDING
 
 
@@ -197,14 +197,20 @@ def test_a_product_of_quaternions_represents_the_product_of_rotations(
     k: FloatArray, phi: float, m: FloatArray, psi: float
 ) -> None:
     p, q = quaternion_of(rotation_about(k, phi)), quaternion_of(rotation_about(m, psi))
-    assert np.abs(rotation_of(multiply(p, q)) - rotation_of(p) @ rotation_of(q)).max() <= 2 * ROUNDING
+    assert (
+        np.abs(
+            rotation_from_quaternion(multiply_quaternions(p, q))
+            - rotation_from_quaternion(p) @ rotation_from_quaternion(q)
+        ).max()
+        <= 2 * ROUNDING
+    )
 
 
 @pytest.mark.slow
 @given(axes, angles)
 def test_the_conjugate_of_a_unit_quaternion_is_the_inverse(axis: FloatArray, angle: float) -> None:
     quat = quaternion_of(rotation_about(axis, angle))
-    assert np.abs(multiply(quat, conjugate(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
+    assert np.abs(multiply_quaternions(quat, conjugate_quaternion(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
 
 
 # -- skew matrices ---------------------------------------------------------------------------------
@@ -245,7 +251,11 @@ REFUSED: dict[str, tuple[Any, Any, str]] = {
     "an unknown frame": (quaternion_rate_matrix, ([0, 0, 0, 1], "world"), "'fixed' or 'body'"),
     "equal times": (integrate_orientation, (np.zeros, [0, 0, 0, 1], [0.0, 0.0]), "increasing"),
     "an unknown sequence": (rotation_from_euler, ("ZYy", [0.0] * 3), "unknown Euler sequence 'ZYy'"),
-    "a quaternion of length 2": (rotation_of, ([0.0, 0.0, 0.0, 2.0],), "unit quaternion: found norm 2"),
+    "a quaternion of length 2": (
+        rotation_from_quaternion,
+        ([0.0, 0.0, 0.0, 2.0],),
+        "unit quaternion: found norm 2",
+    ),
     "a symmetric matrix": (unskew, (np.eye(3),), r"skew-symmetric.*symmetric part of 1"),
     "two numbers": (skew, ([1.0, 2.0],), "w must"),
     "a number": (skew, (3.0,), "w must"),

@@ -6,12 +6,12 @@ eps = 2^-52 or, for single precision, 2^-23:
 
 | Library | How it computes a joint | Roundings of both together |
 |---|---|---|
-| Pinocchio | a rotation matrix; constants by a quaternion | ROUNDINGS |
+| Pinocchio | a rotation matrix; constants by a quaternion | PINOCCHIO_ROUNDINGS |
 | Drake, iDynTree | a rotation matrix; constants from roll, pitch, yaw, 3.1; rotation about any axis by
-  Rodrigues' formula, 4.0; two products, 3.6 | 5.7 + 10.7, at most ROUNDINGS |
+  Rodrigues' formula, 4.0; two products, 3.6 | 5.7 + 10.7, at most PINOCCHIO_ROUNDINGS |
 | Robotics Toolbox | a product of 4 x 4 matrices: three elementary rotations for roll, pitch, yaw, and that of
-  the joint: 1.8 each, with the sine and cosine 0.5 each | 5.7 + 9.2, at most ROUNDINGS |
-| MuJoCo | a unit quaternion | MUJOCO |
+  the joint: 1.8 each, with the sine and cosine 0.5 each | 5.7 + 9.2, at most PINOCCHIO_ROUNDINGS |
+| MuJoCo | a unit quaternion | MUJOCO_ROUNDINGS |
 | Newton | a unit quaternion of single precision, 21.5; rounding q up to 2 pi, 3.2, the origin, 0.5, and roll,
   pitch and yaw up to pi, 4.8, to single precision | SINGLE |
 
@@ -32,8 +32,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
-from urdfkin.model.conventions.convention import transcoded
+from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS
+from urdfkin.model.conventions.convention import transcode
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.plain_xml import plain_xml
@@ -52,7 +52,7 @@ class Library:
     names: list[str]
     evaluate: Evaluate
     #: Roundings for each joint and factor, of urdfkin and the library together, and their unit.
-    roundings: float = ROUNDINGS
+    roundings: float = PINOCCHIO_ROUNDINGS
     eps: float = EPS
     #: Factors of a velocity and a Jacobian beyond those of the comparison with Pinocchio.
     more: int = 1
@@ -125,7 +125,7 @@ def mujoco(robot: Robot, folder: Path) -> Library:
         return T, J @ v, J
 
     names = [model.joint(i).name for i in range(model.njnt)]
-    return Library(names, evaluate, roundings=MUJOCO, more=2, at_mass=True)
+    return Library(names, evaluate, roundings=MUJOCO_ROUNDINGS, more=2, at_mass=True)
 
 
 def drake(robot: Robot, folder: Path) -> Library:
@@ -218,10 +218,10 @@ def newton_usd(robot: Robot, folder: Path) -> Library:
     sim = pytest.importorskip("newton")
     builder = sim.ModelBuilder()
     builder.add_usd(_stage(robot, folder))
-    return _of_newton(robot, builder, transcoded)
+    return _of_newton(robot, builder, transcode)
 
 
-def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) -> Library:
+def _of_newton(robot: Robot, builder: Any, spell_name: Callable[[str], str] = str) -> Library:
     import newton as sim
 
     model = builder.finalize(device="cpu")
@@ -235,7 +235,7 @@ def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         state = model.state()
         state.joint_q.assign(q.astype(np.float32))
-        body = next(k for k, label in enumerate(labels) if label.endswith(f"/{spelled(link)}"))
+        body = next(k for k, label in enumerate(labels) if label.endswith(f"/{spell_name(link)}"))
 
         def twist(v: FloatArray) -> FloatArray:
             state.joint_qd.assign(v.astype(np.float32))
@@ -323,7 +323,7 @@ def usd(robot: Robot, folder: Path) -> Library:
         return T @ prim.behind, path
 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-        T, path = walk(q, bodies.get(transcoded(link), ""))  # a root without joints has none
+        T, path = walk(q, bodies.get(transcode(link), ""))  # a root without joints has none
         if free:
             path += [(3 + k, z, q[:3]) for k, z in enumerate(np.eye(3))]
         J = np.zeros((6, len(v)))

@@ -19,10 +19,10 @@ from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.result import Sameness
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, as_toml, find_convention
 from urdfkin.model.conventions import convention as module
-from urdfkin.model.conventions.convention import JointRule, read_convention, spelled
+from urdfkin.model.conventions.convention import JointRule, parse_convention, spell_name
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -37,7 +37,7 @@ _FIELDS: dict[Any, tuple[str, str]] = {
     "point": ("origin", "centre of mass"), "quaternion": ("xyzw", "wxyz"),
 }  # fmt: skip
 ODD = [
-    replace(Convention(name=f"odd {k}", six=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
+    replace(Convention(name=f"odd {k}", six_vectors=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
     for k, how in enumerate(itertools.product(*_FIELDS.values()))
 ]
 PLANAR = urdfs.robot(
@@ -73,7 +73,7 @@ def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArra
 
 
 def test_every_listed_convention_has_data_and_evidence() -> None:
-    assert tuple(module._built_in()) == BUILT_IN
+    assert tuple(module._load_built_in()) == BUILT_IN
     for name in BUILT_IN:
         found = find_convention(name)
         assert found.note or name == "urdfkin"
@@ -81,7 +81,7 @@ def test_every_listed_convention_has_data_and_evidence() -> None:
     own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
     measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
     assert measured == own | set(LIBRARIES)
-    assert {name for name in BUILT_IN if find_convention(name).measured} == set(LIBRARIES)
+    assert {name for name in BUILT_IN if find_convention(name).measurement} == set(LIBRARIES)
 
 
 def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_convention(
@@ -124,6 +124,28 @@ def test_a_robot_in_a_convention_satisfies_the_kinematic_identities(
         H = other.hessian(q, frame)
         assert np.allclose(np.einsum("nrij,nj->nri", H, v), rate, 0, 1e-11)
         assert np.allclose(other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13)
+
+
+def test_a_matrix_depends_on_q_only_if_the_axes_of_a_free_joints_velocity_differ(
+    cart: Robot, convention: Convention
+) -> None:
+    dog = urdfkin.load("go2", root_joint="floating", verify=False)  # the base has its mass beside the origin
+    for robot, differ in (
+        (dog, "parent" in (convention.linear, convention.angular)),
+        (cart, convention.planar == "parent"),
+    ):
+        conversion = robot.convention(convention)
+        q, v, _ = _values(robot)
+        assert conversion.is_constant == (not differ)
+        if differ:
+            with pytest.raises(InputError, match="depends on q"):
+                conversion.matrix()
+            continue
+        M, inverse = conversion.matrix(), conversion.inverse_matrix()
+        assert not conversion.matrix_rate(q, v).any()
+        assert np.allclose(v @ M.T, conversion.to(q, v)[1], 0, 1e-15)
+        assert np.allclose(conversion.to(q, v)[1] @ inverse.T, v, 0, 1e-15)
+        assert np.array_equal(conversion.matrix(q[0]), M)
 
 
 def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
@@ -258,14 +280,14 @@ IDENTIFIERS = (
 def test_a_joint_name_is_converted_to_a_valid_usd_name(
     name: str, in_usd: str | None, plain: str | None
 ) -> None:
-    assert spelled(name, "usd") == in_usd or in_usd is None
-    assert spelled(name, "identifier") == plain or plain is None
-    assert all(spelled(name, how).isidentifier() for how in ("usd", "identifier", "isaacsim"))
-    assert not spelled(name, "isaacsim").startswith("_")
+    assert spell_name(name, "usd") == in_usd or in_usd is None
+    assert spell_name(name, "identifier") == plain or plain is None
+    assert all(spell_name(name, how).isidentifier() for how in ("usd", "identifier", "isaacsim"))
+    assert not spell_name(name, "isaacsim").startswith("_")
 
 
 def test_a_name_with_a_leading_digit_has_the_prefix_of_isaac_sim_4() -> None:
-    assert spelled("00_fr_abad", "isaacsim") == "a_00_fr_abad"  # github.com/isaac-sim/IsaacLab/issues/2496
+    assert spell_name("00_fr_abad", "isaacsim") == "a_00_fr_abad"  # github.com/isaac-sim/IsaacLab/issues/2496
 
 
 def test_converted_usd_names_are_those_of_the_usd_libraries() -> None:
@@ -274,8 +296,8 @@ def test_converted_usd_names_are_those_of_the_usd_libraries() -> None:
     letters = list("abzAZ019_-./ :éß漢😀#")
     drawn = ["".join(rng.choice(letters, rng.integers(0, 12))) for _ in range(2000)]
     for name in (*NAMES, *drawn):
-        assert spelled(name, "usd") == exchange.getValidPrimName(name)
-        assert spelled(name, "identifier") == tf.MakeValidIdentifier(name)
+        assert spell_name(name, "usd") == exchange.getValidPrimName(name)
+        assert spell_name(name, "identifier") == tf.MakeValidIdentifier(name)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -298,7 +320,7 @@ FEW = ["ur5", "panda", "a1", "tiago", "kinova", "talos_reduced", "so101", "doubl
 def _room(robot: Robot, q: FloatArray, links: list[str], quantity: Quantity) -> FloatArray:
     """Return the bound of the rounding errors of a quantity at q (nq,): (links, ...)."""
     plan = robot.plan([robot.tree.link_index(link) for link in links])
-    bound = quantity.bound(plan, magnitudes(plan, q[None], None, None, STILL_STATE), ALIGNED)
+    bound = quantity.bound(plan, magnitudes(plan, q[None], None, None, FIXED_BASE_STATE), ALIGNED)
     return np.asarray((EPS * bound.k * bound.scale)[0])
 
 
@@ -440,7 +462,7 @@ def test_a_convention_that_is_written_as_toml_is_read_back(name: str) -> None:
         "c": JointRule(None, 1.0, 1e-300, 4096.0),
         "d": JointRule("m", unit="mm"),
     }
-    how = replace(how, rules=rules, evidence="", measured="", sources=())
-    assert read_convention(as_toml(how), "text", how.name) == how
+    how = replace(how, rules=rules, evidence="", measurement="", sources=())
+    assert parse_convention(as_toml(how), "text", how.name) == how
     given = replace(how, order="given", joints=("m", "c"))
-    assert read_convention(as_toml(given), "text", how.name) == given
+    assert parse_convention(as_toml(given), "text", how.name) == given

@@ -21,8 +21,8 @@ import urdfkin
 from tests import urdfs
 from tests.model.conventions.libraries import LIBRARIES, Library
 from tests.urdfs import joint
-from urdfkin.kinematics.roundings import ROUNDINGS
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.kinematics.roundings import PINOCCHIO_ROUNDINGS
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, find_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -56,13 +56,13 @@ def _differences(
         T, twist, J = library.evaluate(their_q, their_v, link)
         frame = f"link:{link}"
         plan = robot.plan([robot.tree.link_index(link)])
-        size = magnitudes(plan, q[None], v[None], None, STILL_STATE)
+        size = magnitudes(plan, q[None], v[None], None, FIXED_BASE_STATE)
         reach = _farthest_mass(robot, q) if library.at_mass else 0.0
-        roundings = size.roundings * library.roundings / ROUNDINGS
+        roundings = size.roundings * library.roundings / PINOCCHIO_ROUNDINGS
         size = replace(size, p=size.p + reach, vel=size.vel + size.w * reach, roundings=roundings)
         for quantity, theirs, ours in (
             (PLACEMENT, T, robot.placement(q, frame)),
-            (VELOCITY, conversion.six(twist), robot.velocity(q, v, frame)),
+            (VELOCITY, conversion.reorder_six_vector(twist), robot.velocity(q, v, frame)),
             (JACOBIAN, conversion.from_jacobian(q, J), robot.jacobian(q, frame)),
         ):
             bound = quantity.bound(plan, size, Reference.LOCAL_WORLD_ALIGNED)
@@ -101,7 +101,8 @@ def test_results_of_a_library_in_its_convention_equal_those_of_urdfkin(
 
 #: The two values of what a convention with a floating base states: a mistake is the other one.
 STATED = {
-    "quaternion": ("xyzw", "wxyz"), "six": ("linear first", "angular first"), "linear": ("body", "parent"),
+    "quaternion": ("xyzw", "wxyz"), "six_vectors": ("linear first", "angular first"),
+    "linear": ("body", "parent"),
     "angular": ("body", "parent"), "base_v": ("linear first", "angular first"), "angle": ("rad", "deg"),
     "base_q": ("position first", "quaternion first"), "point": ("origin", "centre of mass"),
 }  # fmt: skip
@@ -115,7 +116,7 @@ def mistaken(right: Convention, field: str) -> dict[str, Any]:
 @pytest.mark.parametrize("mistake", STATED)
 @pytest.mark.parametrize("name", LIBRARIES)
 def test_a_mistake_in_a_convention_is_detected(name: str, mistake: str, tmp_path: Path) -> None:
-    if name == "rtb" and mistake not in ("six", "angle"):  # it has no floating joint
+    if name == "rtb" and mistake not in ("six_vectors", "angle"):  # it has no floating joint
         return
     robot = _loaded("go2" if mistake == "point" else "a1", name)  # the A1's base has its mass at the origin
     library = LIBRARIES[name](robot, tmp_path)
@@ -200,14 +201,14 @@ def _wrong_for(dog: str, convention: Convention) -> list[str]:
     their_q, their_v = conversion.to(q, v)
     order = [joint for joint in ORDERS[name](_rows(robot), root) if joint in set(robot.joint_names)]
     values = dict(zip(robot.coordinate_names, q, strict=True))
-    rates = dict(zip(robot.rate_names, v, strict=True))
+    rates = dict(zip(robot.velocity_names, v, strict=True))
     six, joints, found = np.arange(6.0), slice(7, None) if free else slice(None), []
     if not np.array_equal(their_q[joints], [values[joint] for joint in order]):
         found.append("order of q")
     if not np.array_equal(their_v[6:] if free else their_v, [rates[joint] for joint in order]):
         found.append("order of v")
-    if not np.array_equal(conversion.six(six), six):
-        found.append("six")
+    if not np.array_equal(conversion.reorder_six_vector(six), six):
+        found.append("six_vectors")
     if free:
         quaternion, axes = BASES[name]
         T = robot.placement(q, root)

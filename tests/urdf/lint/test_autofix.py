@@ -19,21 +19,21 @@ from tests.urdf.lint.cases.arm import Case, arm, axis, limit
 from tests.urdfs import joint, robot
 from urdfkin.system.files import Edit
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, Fix
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Fix
 from urdfkin.urdf.lint import Severity
-from urdfkin.urdf.lint.autofix import TILT, Mended, differences, mend
+from urdfkin.urdf.lint.autofix import MAX_AXIS_TILT, FixResult, find_differences, fix_text
 from urdfkin.urdf.lint.rules.joints import unit_vector
-from urdfkin.urdf.lint.runner import Examined, examine
-from urdfkin.urdf.sources import Text, read_source
+from urdfkin.urdf.lint.runner import Examination, examine
+from urdfkin.urdf.sources import UrdfText, read_source
 
 
-def mended(data: bytes | str, look: Callable[[Text], Examined] = examine) -> Mended:
+def mended(data: bytes | str, look: Callable[[UrdfText], Examination] = examine) -> FixResult:
     """Apply the fixes of all findings."""
-    return mend(text_of(data), look, lambda: lambda _: True)
+    return fix_text(text_of(data), look, lambda: lambda _: True)
 
 
-def text_of(data: bytes | str) -> Text:
-    return Text(data.encode() if isinstance(data, str) else data, "<bytes>", "<bytes>")
+def text_of(data: bytes | str) -> UrdfText:
+    return UrdfText(data.encode() if isinstance(data, str) else data, "<bytes>", "<bytes>")
 
 
 def codes(data: bytes) -> list[str]:
@@ -66,7 +66,13 @@ TIDY = (
 def test_a_fix_changes_only_the_bytes_of_its_finding() -> None:
     done = mended(SLOPPY)
     assert done.text.data.decode() == TIDY
-    assert sorted(f.code for f in done.fixed) == ["URDF208", "URDF503", "URDF510", "URDF510", "URDF601"]
+    assert sorted(f.code for f in done.fixed_findings) == [
+        "URDF208",
+        "URDF503",
+        "URDF510",
+        "URDF510",
+        "URDF601",
+    ]
     assert codes(done.text.data) == []
     assert mended(codecs.BOM_UTF8 + SLOPPY.encode()).text.data == codecs.BOM_UTF8 + TIDY.encode()
     lines = difflib.ndiff(SLOPPY.splitlines(), TIDY.splitlines())
@@ -78,13 +84,13 @@ def test_a_fix_changes_only_the_bytes_of_its_finding() -> None:
 def test_fixed_findings_of_an_unusual_document_disappear_and_no_new_findings_appear(case: Case) -> None:
     before, done = examine(text_of(case.data)), mended(case.data)
     after = examine(done.text)
-    assert len(after.findings) == len(before.findings) - len(done.fixed)
+    assert len(after.findings) == len(before.findings) - len(done.fixed_findings)
     if any(finding.severity is Severity.ERROR for finding in before.findings):
-        assert done.fixed == ()
+        assert done.fixed_findings == ()
     else:
-        assert done.kept == {}
+        assert done.unfixed_reasons == {}
         assert [finding.code for finding in after.findings if finding.fix] == []
-    if not done.fixed:
+    if not done.fixed_findings:
         assert done.text.data == case.data
 
 
@@ -118,7 +124,7 @@ def test_a_finding_whose_remedy_needs_a_decision_is_not_fixed(text: str) -> None
 def test_a_fix_that_would_change_the_robot_is_not_applied(damage: bytes, objection: str) -> None:
     text = arm(axis='<axis xyz="0 0 2"/>')
 
-    def look(asked: Text) -> Examined:
+    def look(asked: UrdfText) -> Examination:
         found = examine(asked)
         at = found.data.find(damage)
         digit = next((k for k in range(at, at + len(damage)) if found.data[k : k + 1].isdigit()), at + 1)
@@ -134,9 +140,9 @@ def test_a_fix_that_would_change_the_robot_is_not_applied(damage: bytes, objecti
 
     done = mended(text, look)
     assert done.text.data == text.encode()
-    assert done.fixed == ()
+    assert done.fixed_findings == ()
     objections = (objection, "URDF503 would remain after the fix", "the fix would cause")
-    assert done.kept["URDF503"].startswith(objections)
+    assert done.unfixed_reasons["URDF503"].startswith(objections)
 
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
@@ -148,7 +154,7 @@ def test_rounding_rotates_a_unit_vector_by_at_most_half_of_tilt(vector: tuple[fl
     a, b = [list(map(Fraction, v)) for v in (vector, unit_vector(vector))]
     cross = sum((a[i] * b[j] - a[j] * b[i]) ** 2 for i, j in ((0, 1), (1, 2), (2, 0)))
     lengths = sum(x * x for x in a) * sum(x * x for x in b)
-    assert cross <= (TILT / 2) ** 2 * lengths * (1 + Fraction(1, 10**9))
+    assert cross <= (MAX_AXIS_TILT / 2) ** 2 * lengths * (1 + Fraction(1, 10**9))
     assert abs(math.hypot(*unit_vector(vector)) - 1.0) < 1e-12
 
 
@@ -166,8 +172,12 @@ def test_same_proves_that_a_fixed_robot_is_the_same(name: str) -> None:
     for old, new in SPOILT.values():
         text = text.replace(old, new)
     done = mended(text)
-    assert {"URDF208", "URDF503"} <= {finding.code for finding in done.fixed}
-    pi = [finding.fix.turns for finding in done.fixed if finding.code == "URDF601" and finding.fix]
+    assert {"URDF208", "URDF503"} <= {finding.code for finding in done.fixed_findings}
+    pi = [
+        finding.fix.max_rotation
+        for finding in done.fixed_findings
+        if finding.code == "URDF601" and finding.fix
+    ]
     found = urdfkin.same(name, done.text.data)
     if not pi:
         assert found
@@ -180,10 +190,12 @@ def test_same_proves_that_a_fixed_robot_is_the_same(name: str) -> None:
 def test_the_fix_of_a_rounded_pi_rotates_no_frame_by_more_than_its_bound() -> None:
     rough = arm(origin='<origin xyz="0 0 0.3" rpy="1.5708 0 -3.1416"/>')
     done = mended(rough)
-    (finding,) = done.fixed
+    (finding,) = done.fixed_findings
     a, b = (urdfkin.load(data) for data in (rough, done.text.data))
     R_a, R_b = (robot.placement(robot.neutral(), "l1")[:3, :3] for robot in (a, b))
-    assert 0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).turns < 1.2e-5
+    assert (
+        0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).max_rotation < 1.2e-5
+    )
 
 
 def test_a_change_of_any_field_of_a_joint_is_a_difference_except_for_positions_in_the_file() -> None:
@@ -197,19 +209,19 @@ def test_a_change_of_any_field_of_a_joint_is_a_difference_except_for_positions_i
     assert {field.name for field in dataclasses.fields(first)} == places | changed.keys()
     for name, value in changed.items():
         other = dataclasses.replace(record, joints=[dataclasses.replace(first, **{name: value}), *others])
-        assert list(differences(record, other, {})) != [], name
-    assert list(differences(record, record, {})) == []
+        assert list(find_differences(record, other, {})) != [], name
+    assert list(find_differences(record, record, {})) == []
 
 
 def test_a_file_with_an_error_is_not_fixed() -> None:
     done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
-    assert done.kept == {"URDF208": "the file has an error (URDF507); correct this error first"}
+    assert done.unfixed_reasons == {"URDF208": "the file has an error (URDF507); correct this error first"}
 
 
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_fixed() -> None:
-    many = WRITTEN_OUT + 5
+    many = MAX_COMPLETE_FINDINGS + 5
     text = robot(*(joint(f"j{i}", "fixed", "l0", f"l{i}", axis="") for i in range(1, many)))
     done = mended(text.replace("<link ", '<link shade="3" '))
-    assert (len(done.fixed), done.kept) == (many, {})
+    assert (len(done.fixed_findings), done.unfixed_reasons) == (many, {})
     assert b"shade" not in done.text.data

@@ -15,8 +15,8 @@ import urdfkin
 from tests import urdfs
 from tests.urdf.lint.cases import CASES, left_out
 from tests.urdf.lint.cases.arm import Case, arm
-from urdfkin.urdf.lint import Finding, Limits, Severity, check, check_text
-from urdfkin.urdf.lint.pages import OF_OTHERS, explain, page
+from urdfkin.urdf.lint import Finding, Severity, SizeLimits, check, check_text
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, explain, page
 from urdfkin.urdf.records import FURTHER_LIMITS
 
 SNAPSHOT = Path(__file__).with_name("messages.txt")
@@ -58,20 +58,20 @@ def test_the_messages_of_findings_equal_the_stored_snapshot() -> None:
 
 # -- parts of MJCF and USD files ---------------------------------------------------------------------------
 
-OF_MJCF = [code for code in OF_OTHERS if code.startswith("MJCF")]
+OF_MJCF = [code for code in MJCF_AND_USD_RULES if code.startswith("MJCF")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("code", OF_OTHERS)
+@pytest.mark.parametrize("code", MJCF_AND_USD_RULES)
 def test_only_the_bad_example_on_a_page_about_mjcf_or_usd_has_the_finding(code: str, tmp_path: Path) -> None:
-    of_mjcf, rule = code in OF_MJCF, OF_OTHERS[code]
+    of_mjcf, rule = code in OF_MJCF, MJCF_AND_USD_RULES[code]
     pytest.importorskip("mujoco" if of_mjcf else "pxr")
     found = []
-    for text in (page(code).example, page(code).cure):
+    for text in (page(code).example, page(code).correction):
         file = tmp_path / ("robot.xml" if of_mjcf else "robot.usda")
         file.write_text(text.lstrip())
         findings = urdfs.loaded(file, verify=False).findings
-        codes = {code} if of_mjcf else OF_OTHERS.keys()
+        codes = {code} if of_mjcf else MJCF_AND_USD_RULES.keys()
         found.append({(one.code, one.severity) for one in findings if one.code in codes})
     assert found == [{(code, rule.severity)}, set()]
     assert explain(rule).startswith(f"{code} {rule.slug} ({rule.severity.value})")
@@ -140,7 +140,7 @@ def test_a_limit_has_an_error_or_a_mark_exactly_if_pinocchio_refuses_it(kind: st
     for limit in limits():
         text = joint_with(limit, kind, version)
         findings = check(text.encode())
-        marked = any(finding.oracle is not None for finding in findings)
+        marked = any(finding.pinocchio_reading is not None for finding in findings)
         refused = any(finding.severity is Severity.ERROR for finding in findings)
         right = not marked if pinocchio_reads(text) else marked or refused
         assert right, (limit, [str(finding) for finding in findings])
@@ -236,11 +236,12 @@ def test_suggestions_for_5000_unknown_links_take_a_limited_time() -> None:
 @pytest.mark.parametrize(
     ("limits", "code"),
     [
-        (Limits(bytes=10), "URDF108"), (Limits(elements=1), "URDF114"), (Limits(depth=1), "URDF115"),
-        (Limits(attributes=0), "URDF116"), (Limits(name=2), "URDF117"),
+        (SizeLimits(bytes=10), "URDF108"), (SizeLimits(elements=1), "URDF114"),
+        (SizeLimits(depth=1), "URDF115"), (SizeLimits(attributes=0), "URDF116"),
+        (SizeLimits(name=2), "URDF117"),
     ],
 )  # fmt: skip
-def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Limits, code: str) -> None:
+def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: SizeLimits, code: str) -> None:
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
     assert finding.code == code
     assert "--max-" in str(finding.remedy)
@@ -252,7 +253,7 @@ def test_a_number_that_is_too_long_is_an_error_only_if_kinematics_uses_the_numbe
     mass = '<inertial><mass value="{}"/></inertial>'
     text = '<robot name="r"><link name="a">{}</link><link name="b"/>' + joint + "</robot>"
     for inside, origin, severity in (("", "1" * 9, "error"), (mass.format("1" * 9), "1", "warning")):
-        findings = check_text(text.format(inside, origin).encode(), limits=Limits(number=8))
+        findings = check_text(text.format(inside, origin).encode(), limits=SizeLimits(number=8))
         assert ("URDF305", severity) in [(f.code, f.severity.value) for f in findings]
 
 

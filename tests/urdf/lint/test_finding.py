@@ -12,7 +12,7 @@ from tests.urdfs import joint, robot
 from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check, check_text
-from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_summary
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.runner import read_urdf
 
@@ -33,7 +33,7 @@ def test_an_error_contains_all_findings_and_prints_the_first() -> None:
     assert isinstance(error, UrdfkinError)
     assert len(error.findings) == 8
     assert str(error).startswith("<text>: the URDF has 8 errors; run 'urdfkin explain URDF402' for details")
-    assert str(error).count("another link has this name") == UrdfError.SHOWN
+    assert str(error).count("another link has this name") == UrdfError.MAX_SHOWN_ERRORS
     assert "3 more" in str(error)
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.findings) == (str(error), error.findings)
@@ -53,7 +53,7 @@ def test_many_warnings_of_one_kind_become_the_warning_with_the_greatest_weight()
     joints = (joint(f"j{i}", "fixed", "a", f"b{i}", origin, "") for i, origin in enumerate(far))
     text = robot(*joints).replace("<joint", "\n<joint").encode()
     (folded,) = check_text(text)
-    assert (folded.name, folded.also) == ("j3", (2, 3, 4, 6, 7))
+    assert (folded.name, folded.other_lines) == ("j3", (2, 3, 4, 6, 7))
     assert len(check_text(text, fold=False)) == 6
 
 
@@ -108,7 +108,7 @@ def test_json_contains_every_field(findings: list[Finding]) -> None:
     document = json.loads(as_json(findings, ["<text>"], "1.2.3"))
     assert (document["schema"], document["version"], document["files"]) == ("urdfkin-findings", 1, ["<text>"])
     assert len(document["findings"]) == len(findings) == sum(document["counts"].values())
-    names = {"code", "severity", "line", "column", "element", "name", "found", "remedy", "oracle"}
+    names = {"code", "severity", "line", "column", "element", "name", "found", "remedy", "pinocchio_reading"}
     assert names <= document["findings"][0].keys()
 
 
@@ -120,5 +120,7 @@ def test_each_github_command_is_one_escaped_line(findings: list[Finding]) -> Non
 
 
 def test_the_summary_counts_all_findings_that_a_finding_represents() -> None:
-    folded = Finding("URDF601", Severity.NOTE, "m", also=(3, 4))
-    assert summary([folded, Finding("URDF101", Severity.ERROR, "m")], 2) == "1 error, 3 notes in 2 files"
+    folded = Finding("URDF601", Severity.NOTE, "m", other_lines=(3, 4))
+    assert (
+        format_summary([folded, Finding("URDF101", Severity.ERROR, "m")], 2) == "1 error, 3 notes in 2 files"
+    )

@@ -15,8 +15,8 @@ from tests.urdf.lint.cases.arm import arm
 from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, Rule
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check, rules
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Rule
+from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, SizeLimits, check, rules
 from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
 HERE = Path(rules.__file__).parent
@@ -25,10 +25,10 @@ EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: ru
 
 #: Limits with which the examples of some rules are checked.
 _LIMITS = {
-    "too-deep-for-pinocchio": Limits(depth=5_000),
-    "too-large": Limits(bytes=100),
-    "too-many-elements": Limits(elements=10),
-    "markup-too-long": Limits(markup=100),
+    "too-deep-for-pinocchio": SizeLimits(depth=5_000),
+    "too-large": SizeLimits(bytes=100),
+    "too-many-elements": SizeLimits(elements=10),
+    "markup-too-long": SizeLimits(markup=100),
 }
 
 
@@ -42,13 +42,13 @@ def document(example: str) -> str:
 
 
 def findings_of(rule: Rule, example: str) -> list[Finding]:
-    return check(document(example).encode(), limits=_LIMITS.get(rule.slug, DEFAULT_LIMITS))
+    return check(document(example).encode(), limits=_LIMITS.get(rule.slug, DEFAULT_SIZE_LIMITS))
 
 
 @EVERY_RULE
 def test_the_bad_example_has_the_finding_and_an_error_only_if_the_rule_is_an_error(rule: Rule) -> None:
     findings = findings_of(rule, page(rule.id).example)
-    assert {f.oracle for f in findings if f.code == rule.id} == {rule.oracle}, findings
+    assert {f.pinocchio_reading for f in findings if f.code == rule.id} == {rule.pinocchio_reading}, findings
     assert any(f.severity is Severity.ERROR for f in findings) == (
         rule.severity is Severity.ERROR or rule.slug == "stray-text"
     ), findings
@@ -56,7 +56,7 @@ def test_the_bad_example_has_the_finding_and_an_error_only_if_the_rule_is_an_err
 
 @EVERY_RULE
 def test_the_corrected_example_has_no_error_and_not_the_finding(rule: Rule) -> None:
-    findings = findings_of(rule, page(rule.id).cure)
+    findings = findings_of(rule, page(rule.id).correction)
     assert not [f for f in findings if f.severity is Severity.ERROR or f.code == rule.id], findings
 
 
@@ -72,7 +72,7 @@ def test_codes_and_texts_of_rules_have_the_required_form_and_pages_fit_a_termina
     assert page(rule.id).why.endswith(".")
     assert re.match(
         r"Pinocchio (reads|refuses) the example\b.*; yourdfpy (reads|refuses) the example\b.*\.$",
-        page(rule.id).others,
+        page(rule.id).other_readers,
     )
 
 
@@ -81,7 +81,12 @@ def test_a_file_of_pages_has_a_page_for_each_rule_in_order_and_no_other_content(
     assert list(topic_pages(topic)) == [rule.id for rule in TOPICS[topic]]
     data = tomllib.loads(page_files()[topic].read_text("utf-8"))
     known = {field.name for field in fields(Page)} | {"parts"}
-    assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {"cure", "others", "parts", "question"}
+    assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {
+        "correction",
+        "other_readers",
+        "parts",
+        "question",
+    }
     assert all(data[rule.id].keys() <= known for rule in TOPICS[topic])
 
 
@@ -111,7 +116,9 @@ def verdicts() -> dict[str, dict[str, str]]:
 def test_pinocchio_and_yourdfpy_read_the_bad_example_if_the_page_says_so(
     rule: Rule, verdicts: dict[str, dict[str, str]]
 ) -> None:
-    pinocchio, yourdfpy = re.findall(r"(?:Pinocchio|; yourdfpy) (reads|refuses) the ex", page(rule.id).others)
+    pinocchio, yourdfpy = re.findall(
+        r"(?:Pinocchio|; yourdfpy) (reads|refuses) the ex", page(rule.id).other_readers
+    )
     assert verdicts[rule.id] == {"pinocchio": pinocchio, "yourdfpy": yourdfpy}
 
 
@@ -121,7 +128,11 @@ def test_pinocchio_and_yourdfpy_read_the_bad_example_if_the_page_says_so(
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", catalogue())
 def test_no_robot_of_the_catalogue_has_an_error_or_cannot_be_verified(robot: str) -> None:
-    wrong = [str(one) for one in check(robot) if one.severity is Severity.ERROR or one.oracle is not None]
+    wrong = [
+        str(one)
+        for one in check(robot)
+        if one.severity is Severity.ERROR or one.pinocchio_reading is not None
+    ]
     assert wrong == []
 
 
@@ -175,6 +186,8 @@ def test_the_nearest_comment_silences_a_finding_and_all_other_comments_are_unuse
 
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_silenced() -> None:
-    text = urdfs.robot(urdfs.joint("j", "fixed", "a", "b", axis="", more="<odd/>" * (WRITTEN_OUT + 5)))
-    assert len(check(text)) == WRITTEN_OUT
+    text = urdfs.robot(
+        urdfs.joint("j", "fixed", "a", "b", axis="", more="<odd/>" * (MAX_COMPLETE_FINDINGS + 5))
+    )
+    assert len(check(text)) == MAX_COMPLETE_FINDINGS
     assert check(COMMENT.format("URDF207") + text) == []

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from urdfkin.compiled.machine.compiling import compiled
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 
-globals().update(vars(bound(decorate=compiled)))
+globals().update(vars(bind_equations(decorate=compiled)))
 
 
 def __getattr__(name: str) -> Any:

@@ -19,23 +19,16 @@ from urdfkin.dh.compare.fit import (
     tip_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
-from urdfkin.dh.compare.result import (
-    EXPLAINED,
-    TRAVEL,
-    AbsorbedOffset,
-    CellDifference,
-    TableComparison,
-    has_range,
-)
+from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison, has_range
 from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
-from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
+from urdfkin.model.configuration import axis_range, sample_uniform
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
-from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
 #: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
@@ -85,6 +78,7 @@ def compare(
     comparison = TableComparison(
         reference=table,
         reach=targets.scale,
+        travel=sum(max(map(abs, ends)) for ends in _travels(chain).values()),
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_offsets(standard, fitted),
@@ -137,7 +131,7 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, LEAST_SIZE)
+    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, MIN_ROBOT_SIZE)
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
@@ -166,17 +160,17 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
     """Return random joint values (count, n) and the tip's poses, without mimic rules."""
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
-    values = values_within(ranges, count, seed)
+    values = sample_uniform(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 
 
 def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
     """Return the range (m) of each prismatic joint."""
-    limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
     return {
-        name: (limit.lower, limit.upper) if has_range(limit) else (-TRAVEL, TRAVEL)
-        for name, limit in limits.items()
+        joint.name: axis_range(joint.kind, joint.limit if has_range(joint.limit) else None)
+        for joint in chain.joints
+        if not joint.kind.turns
     }
 
 
@@ -280,14 +274,14 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
     The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
-    limits, or within `TRAVEL` of zero if they have no limits.
+    limits, or within `ASSUMED_LIMIT` of zero if `has_range` is false.
     """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
     variables = variables_of(pair, tolerance_of(*mechanisms))
     tip = link_names(table)[-1]
     frame = next(frame for frame in pair.frames if pair.a.tree.links[frame.a] == tip)
-    return upper_bounds(pair, variables, frame, FINE)
+    return upper_bounds(pair, variables, frame, FINE_GRID)
 
 
 def _free(path: FrameChain, table: DHTable) -> KinematicTree:

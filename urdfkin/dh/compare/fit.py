@@ -24,7 +24,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHTable, along_axis, between_axes
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
-from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_a_fit
+from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, fit_roundings
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
@@ -158,7 +158,7 @@ def tip_derivatives(
     """
     scale = targets.scale
     path, amounts = model.path_at(targets.values)
-    poses, twists = path.columns_at(path.frames(amounts) if frames is None else frames)
+    poses, twists = path.pose_and_jacobian_from_frames(path.frames(amounts) if frames is None else frames)
     n = len(model.cells)
     twists = twists * np.where(np.tile(_IS_ANGLE, n), 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
@@ -221,7 +221,7 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
         # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
-        shorten = min(1.0, _LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
+        shorten = min(1.0, _LONGEST_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = with_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
     return best
 
@@ -288,7 +288,7 @@ def fitted_model(
         return metres + targets.scale * radians
 
     best, best_size = written, size(written)
-    if best_size <= EPS * of_a_fit(0) * targets.scale:
+    if best_size <= EPS * fit_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
         # Least squares minimize the sum over all samples, but models are compared by their worst sample.
@@ -364,7 +364,7 @@ def _least_squares_fit(
         residuals,
         derivatives,
         lambda model, free: with_changes(model, free, targets.scale),
-        longest=_LONGEST_STEP * targets.scale,
+        max_step=_LONGEST_STEP * targets.scale,
         patience=_PATIENCE,
     )
 

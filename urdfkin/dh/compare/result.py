@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeGuard
 
 import numpy as np
 
@@ -15,7 +14,8 @@ from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
-from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.kinematics.roundings import EPS, fit_roundings
+from urdfkin.model.configuration import ASSUMED_LIMIT
 from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
@@ -23,8 +23,6 @@ Parts = list[str | Table | Matrix]
 #: Largest tip error (rad, or metres per metre of reach) that counts as zero after a correction of cells.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Largest distance (m) from zero that is assumed for a prismatic joint without limits.
-TRAVEL = 0.5
 #: `resolution` replaces a smaller tip error (rad, or metres per metre of reach) by this number.
 _FINEST = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
@@ -123,12 +121,13 @@ class TableComparison:
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
             offsets. The method `placement` of this table takes the URDF's joint coordinates.
+        travel: Sum of the largest distances (m) of the prismatic joints from zero.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         metres, radians: Largest errors of the fitted table's tip on the samples.
         most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all angles,
             and for all displacements within limits. A prismatic joint without limits is assumed to be within
-            0.5 m of zero. The bounds do not include rounding errors.
+            10 m of zero. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         instead: The cells that must change so that the table agrees without a fit. Empty if these cells are
             too many, or if a tip error remains after their correction.
@@ -139,6 +138,7 @@ class TableComparison:
 
     reference: DHTable
     reach: float
+    travel: float
     fitted: bool
     senses: tuple[int, ...]
     offsets: tuple[float, ...]
@@ -170,7 +170,12 @@ class TableComparison:
     @property
     def rounding(self) -> float:
         """Largest tip error that rounding can cause, in radians, or in metres per metre of reach."""
-        return EPS * of_a_fit(len(self.reference.rows))
+        return EPS * fit_roundings(len(self.reference.rows))
+
+    @property
+    def rounding_metres(self) -> float:
+        """Largest distance (m) between tips that rounding can cause; the displacements are also rounded."""
+        return self.rounding * (self.reach + self.travel)
 
     @property
     def resolution(self) -> float:
@@ -183,16 +188,30 @@ class TableComparison:
 
         The proof covers the same joint values as `most_metres`.
         """
-        return self.most_metres <= self.rounding * self.reach and self.most_radians <= self.rounding
+        return self.most_metres <= self.rounding_metres and self.most_radians <= self.rounding
+
+    @property
+    def condition(self) -> str:
+        """The assumption about prismatic joints without limits, as text; empty if there are no such joints.
+
+        A joint counts as a joint without limits if `has_range` is false.
+        """
+        rows = self.reference.rows
+        free = [row.joint for row in rows if not row.kind.turns and not has_range(row.limit)]
+        return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
 
     @property
     def as_written(self) -> bool:
         """Whether the written table, with its base, tool and zeros, equals the URDF up to rounding."""
-        return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
+        return self.written_metres <= self.rounding_metres and self.written_radians <= self.rounding
 
 
-def has_range(limit: Limit | None) -> TypeGuard[Limit]:
-    """Return whether a prismatic joint's limits allow more than one value, and are finite."""
+def has_range(limit: Limit | None) -> bool:
+    """Return whether a prismatic joint's limits are finite and allow more than one value.
+
+    A comparison also moves a joint with equal limits: at a single value, the samples do not depend on the
+    direction of the joint's axis. The default of both limits is 0, so a URDF may omit the limits.
+    """
     return is_bounded(limit) and limit.lower < limit.upper
 
 
@@ -247,9 +266,8 @@ def _verdict(found: TableComparison) -> list[str]:
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
     verdict = agrees if found.agrees else "DIFFERS"
     error = _tip_error(found.metres, found.radians)
-    values = "for all joint values within limits"
-    if free := [row.joint for row in table.rows if not row.kind.turns and not has_range(row.limit)]:
-        values += f", with {', '.join(free)} within {TRAVEL} m of zero"
+    condition = f", with {found.condition}" if found.condition else ""
+    values = f"for all joint values within limits{condition}"
     proof = f"{found.samples} samples; proven bound {values}: {_proven(found)}"
     if found.as_written:
         return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
@@ -262,7 +280,7 @@ def _verdict(found: TableComparison) -> list[str]:
     changes = [
         f"{what} by {_errors(end.metres, end.radians)}"
         for what, end in zip(("the base", "the tool"), ends, strict=True)
-        if end.metres > found.rounding * found.reach or end.radians > found.rounding
+        if end.metres > found.rounding_metres or end.radians > found.rounding
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     reversed_ = sum(sense < 0 for sense in found.senses)

@@ -23,7 +23,7 @@ from urdfkin.dh.common_normals import (
     tilt_of,
 )
 from urdfkin.dh.table import DHRow, DHTable, along_axis, angle_difference
-from urdfkin.model.chain import LEAST_SIZE, FrameChain
+from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 
 PATTERNS = 12
@@ -85,7 +85,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
     The table must have the same kinds of joints as the path. With prismatic joints, several combinations of
     signs may give equal tables, and only a fit can distinguish them.
     """
-    reach = max(chain.reach, reference.span, LEAST_SIZE)
+    reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
     partials = [_PartialAlignment(costs[sense], (sense,), (), 0.0, 0.0, np.eye(4)) for sense in costs]
     for i in range(len(reference.rows) - 1):

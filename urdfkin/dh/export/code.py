@@ -16,6 +16,7 @@ from urdfkin.dh.export.text import cells, formula
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.dh.units import COLUMNS, Units, fraction_text, pi_fraction
 from urdfkin.errors import InputError
+from urdfkin.model.configuration import TRAVEL_CONDITION
 from urdfkin.model.tree import FloatArray, is_bounded
 
 
@@ -44,7 +45,8 @@ def header(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m")
+        condition = f" if {TRAVEL_CONDITION}" if table.unlimited else ""
+        lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m{condition}")
     return [plain(line) for line in lines]
 
 

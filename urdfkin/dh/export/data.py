@@ -17,6 +17,7 @@ from typing import Any
 from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.units import COLUMNS
 from urdfkin.errors.escape import csv_cell, escape
+from urdfkin.model.configuration import TRAVEL_CONDITION
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
@@ -45,6 +46,8 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
                 for change in snap.changes
             ],
         }
+        if table.unlimited:
+            data["snap"]["holds_if"] = TRAVEL_CONDITION
     elsewhere = [name for name in table.joint_names if name not in {row.joint for row in table.rows}]
     if elsewhere:
         data["coordinates"] = elsewhere

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.snapping import SAMPLES, samples_within_limits, travel
+from urdfkin.dh.snapping import SAMPLES, samples_within_limits
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import Angles, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
-from urdfkin.model.configuration import axis_range
+from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -127,9 +127,10 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = at_most(snap.metres), at_most(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
+    condition = f"limits and {TRAVEL_CONDITION}" if table.unlimited else "limits"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad; this is guaranteed if prismatic joints are within their limits",
+        f"{radians} rad; this is guaranteed if prismatic joints are within their {condition}",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:
@@ -202,8 +203,9 @@ def _caption(table: DHTable) -> str:
     if table.snap is not None and table.snap.changes:
         caption += (
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m."
+            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m"
         )
+        caption += f" if {TRAVEL_CONDITION}." if table.unlimited else "."
     return caption
 
 
@@ -233,18 +235,24 @@ def _with_powers_of_ten(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits."""
+    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits.
+
+    If `unlimited` is true, a prismatic joint has no limits. The error and the bound then assume a travel of
+    at most `ASSUMED_LIMIT`.
+    """
 
     digits: int
     metres: float
     bound: float | None
     samples: int
+    unlimited: bool = False
 
     def __str__(self) -> str:
         proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
+        condition = f"; this holds if {TRAVEL_CONDITION}" if self.unlimited else ""
         return (
             f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
-            f" of its exact position on {self.samples} samples{proven}"
+            f" of its exact position on {self.samples} samples{proven}{condition}"
         )
 
 
@@ -258,7 +266,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _printed_bound(table, rows, base, tool)
     finite_bound = bound if math.isfinite(bound) else None
-    return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), finite_bound, SAMPLES)
+    measured, unlimited = float(distances.max(initial=0.0)), bool(table.unlimited)
+    return PrintedPrecision(units.digits, measured, finite_bound, SAMPLES, unlimited)
 
 
 def _printed_row(row: DHRow, units: Units) -> DHRow:
@@ -279,6 +288,20 @@ def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
     return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
 
 
+def _largest_coordinate(table: DHTable, row: DHRow) -> float:
+    """Return the largest absolute value (rad or m) of the joint that the joint of a row mimics.
+
+    If the table has no row of the mimicked joint, the limits of the mimic joint limit its value.
+    """
+    if row.mimic is None or row.mimic.multiplier == 0.0:
+        return 0.0
+    for other in table.rows:
+        if other.joint == row.mimic.leader:
+            return max(map(abs, axis_range(other.kind, other.limit)))
+    largest = max(map(abs, axis_range(row.kind, row.limit)))
+    return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)
+
+
 def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
 
@@ -288,11 +311,10 @@ def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, to
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
-        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else travel(row.limit))
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
         if row.mimic is not None and printed_row.mimic is not None:
-            largest_value = max(abs(bound) for bound in axis_range(row.kind, row.limit))
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
-            total += multiplier_error * largest_value * max(lever, 1.0)
+            total += multiplier_error * _largest_coordinate(table, row) * max(lever, 1.0)
         errors = np.abs(np.subtract(row.cells, printed_row.cells))
         total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
     base_error = base - table.base

@@ -1,7 +1,7 @@
 """Conventions of other programs: orders of joints and rows, quaternions, base velocities, units and zeros."""
 
 from urdfkin.model.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
-from urdfkin.model.conventions.conversion import Conversion, Reordering, reordering
+from urdfkin.model.conventions.conversion import Conversion, Reordering, find_reordering
 
 __all__ = [
     "BUILT_IN",
@@ -11,5 +11,5 @@ __all__ = [
     "Reordering",
     "as_toml",
     "find_convention",
-    "reordering",
+    "find_reordering",
 ]

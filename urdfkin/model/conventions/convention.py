@@ -51,7 +51,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "angular": ("body", "parent"),
     "point": ("origin", "centre of mass"),
     "planar": ("body", "parent"),
-    "six": ("linear first", "angular first"),
+    "six_vectors": ("linear first", "angular first"),
     "names": ("urdf", "usd", "identifier", "isaacsim"),
     "angle": _ANGLES,
 }  # fmt: skip
@@ -78,7 +78,7 @@ class JointRule:
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
-    def of(self) -> str:
+    def quantity(self) -> str:
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -105,12 +105,12 @@ class Convention:
     angular: str = "body"
     point: str = "origin"
     planar: str = "body"
-    six: str = "linear first"
+    six_vectors: str = "linear first"
     names: str = "urdf"
     angle: str = "rad"
     rules: Mapping[str, JointRule] = field(default_factory=dict)
     evidence: str = ""
-    measured: str = ""
+    measurement: str = ""
     sources: tuple[str, ...] = ()
     note: str = ""
 
@@ -120,7 +120,7 @@ class Convention:
 
 
 @cache
-def _built_in() -> dict[str, Convention]:
+def _load_built_in() -> dict[str, Convention]:
     text = Path(__file__).with_name("conventions.toml").read_text("utf-8")
     return {
         name: Convention(name=name, **{**row, "sources": tuple(row.get("sources", ()))})
@@ -141,45 +141,47 @@ def find_convention(name: str | Path | Convention) -> Convention:
         return name
     if not isinstance(name, str | Path):
         raise InputError("a convention must be a name or a TOML file", found=safe_repr(name))
-    if (known := _built_in().get(str(name))) is not None:
+    if (known := _load_built_in().get(str(name))) is not None:
         return known
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
-        return read_convention(read_text(path), shortened(path), path.stem)
+        return parse_convention(read_text(path), shortened(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
     error.remedy = f"{error.remedy} {names}"
     raise error
 
 
-def read_convention(text: str, where: str, name: str) -> Convention:
+def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse the TOML text of a convention; `name` replaces a missing name."""
     try:
-        found = tomllib.loads(text)
+        entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError("this is not a TOML file", where=where, found=str(error)) from None
-    like = found.pop("like", "urdf")
-    if like not in _built_in():
+    like = entries.pop("like", "urdf")
+    if like not in _load_built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
-    base = replace(_built_in()[like], name=name, title=name, evidence="", measured="", sources=(), note="")
+    base = replace(
+        _load_built_in()[like], name=name, title=name, evidence="", measurement="", sources=(), note=""
+    )
     changes: dict[str, Any] = {}
-    for word in ("name", "title", "note"):
-        if word in found:
-            changes[word] = _text(found.pop(word), word, where)
-    joints = found.pop("joints", None)
+    for key in ("name", "title", "note"):
+        if key in entries:
+            changes[key] = _as_text(entries.pop(key), key, where)
+    joints = entries.pop("joints", None)
     if joints is not None:
         if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
             raise InputError("`joints` must be a list of names", where=where, found=safe_repr(joints))
         changes |= {"order": "given", "joints": tuple(joints)}
-        demand_unique(joints, where)
-    rules = found.pop("joint", {})
+        check_unique(joints, where)
+    rules = entries.pop("joint", {})
     if not isinstance(rules, dict) or not all(isinstance(rule, dict) for rule in rules.values()):
         raise InputError(
             "`joint` must contain tables, such as [joint.elbow]", where=where, found=safe_repr(rules)
         )
-    changes["rules"] = {joint: _rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
-    demand_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
-    for key, value in found.items():
+    changes["rules"] = {joint: _parse_rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
+    check_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
+    for key, value in entries.items():
         if key not in _CHOICES:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
         if value not in _CHOICES[key]:
@@ -189,39 +191,39 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     return replace(base, **changes)
 
 
-def demand_unique(names: Sequence[str], where: str) -> None:
+def check_unique(names: Sequence[str], where: str) -> None:
     if len(set(names)) != len(names):
         double = next(name for i, name in enumerate(names) if name in names[:i])
         raise InputError("two joints have the same name in the convention", where=where, found=repr(double))
 
 
-def _text(value: object, word: str, where: str) -> str:
+def _as_text(value: object, key: str, where: str) -> str:
     if not isinstance(value, str):
-        raise InputError(f"`{word}` must be a text", where=where, found=safe_repr(value))
+        raise InputError(f"`{key}` must be a text", where=where, found=safe_repr(value))
     return value
 
 
-def _number(value: object, word: str, where: str) -> float:
+def _as_number(value: object, key: str, where: str) -> float:
     if not is_real(value) or not math.isfinite(value):
-        raise InputError(f"`{word}` must be a finite number", where=where, found=safe_repr(value))
+        raise InputError(f"`{key}` must be a finite number", where=where, found=safe_repr(value))
     return float(value)
 
 
-def _rule(rule: dict[str, Any], where: str) -> JointRule:
+def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
     for key in rule:
         if key not in ("name", "sign", "zero", "unit"):
             raise UnknownNameError("key", key, ("name", "sign", "zero", "unit"), where=where)
-    name = _text(rule["name"], "name", where) if "name" in rule else None
-    sign = _number(rule.get("sign", 1), "sign", where)
+    name = _as_text(rule["name"], "name", where) if "name" in rule else None
+    sign = _as_number(rule.get("sign", 1), "sign", where)
     if abs(sign) != 1.0:
         raise InputError("`sign` must be 1 or -1", where=where, found=safe_repr(rule["sign"]))
-    zero = _number(rule.get("zero", 0.0), "zero", where)
+    zero = _as_number(rule.get("zero", 0.0), "zero", where)
     unit = rule.get("unit")
     if isinstance(unit, str):
         if unit not in _UNITS:
             raise UnknownNameError("unit", unit, _UNITS, where=where)
     elif unit is not None:
-        unit = _number(unit, "unit", where)
+        unit = _as_number(unit, "unit", where)
         if unit <= 0.0:
             raise InputError(
                 "`unit` must be positive: the number of units in one turn", where=where, found=safe_repr(unit)
@@ -229,27 +231,27 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
     return JointRule(name, sign, zero, unit)
 
 
-def as_toml(how: Convention) -> str:
-    lines = [f"{word} = {_quoted(text)}" for word in ("title", "note") if (text := getattr(how, word))]
+def as_toml(convention: Convention) -> str:
+    lines = [f"{word} = {_quote(text)}" for word in ("title", "note") if (text := getattr(convention, word))]
     lines.append('like = "urdfkin"')
-    if how.order == "given":
-        lines.append(f"joints = [{', '.join(map(_quoted, how.joints))}]")
+    if convention.order == "given":
+        lines.append(f"joints = [{', '.join(map(_quote, convention.joints))}]")
     plain = Convention(name="")
     for key in _CHOICES:
-        value = getattr(how, key)
+        value = getattr(convention, key)
         if value != getattr(plain, key) and value != "given":
-            lines.append(f"{key} = {value if isinstance(value, int) else _quoted(value)}")
-    for joint, rule in how.rules.items():
-        lines += ["", f"[joint.{_quoted(joint)}]"]
-        lines += [] if rule.name is None else [f"name = {_quoted(rule.name)}"]
+            lines.append(f"{key} = {value if isinstance(value, int) else _quote(value)}")
+    for joint, rule in convention.rules.items():
+        lines += ["", f"[joint.{_quote(joint)}]"]
+        lines += [] if rule.name is None else [f"name = {_quote(rule.name)}"]
         lines += [] if rule.sign == 1.0 else ["sign = -1"]
         lines += [] if not rule.zero else [f"zero = {float(rule.zero)!r}"]
         if rule.unit is not None:
-            lines.append(f"unit = {_quoted(rule.unit) if isinstance(rule.unit, str) else repr(rule.unit)}")
+            lines.append(f"unit = {_quote(rule.unit) if isinstance(rule.unit, str) else repr(rule.unit)}")
     return "\n".join(lines) + "\n"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """Return a text as a quoted TOML string, with the escapes of JSON.
 
     TOML also requires an escape for the character DEL.
@@ -262,22 +264,22 @@ def _quoted(text: str) -> str:
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 #: The last base-62 digit of an encoded number is less than this value. No other digit is less than the value.
-_CONTINUES = 31
+_THRESHOLD = 31
 
 
-def spelled(name: str, how: str) -> str:
-    """Return a name as another program writes it; `how` is a value of `Convention.names`.
+def spell_name(name: str, style: str) -> str:
+    """Return a name as another program writes it; `style` is a value of `Convention.names`.
 
-    >>> [spelled("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
+    >>> [spell_name("1", style) for style in ("urdf", "usd", "identifier", "isaacsim")]
     ['1', 'tn__1_', '_', 'a_1']
     """
-    match how:
+    match style:
         case "usd":
-            return transcoded(name)
+            return transcode(name)
         case "identifier":
-            return identifier(name)
+            return make_identifier(name)
         case "isaacsim":
-            valid = identifier(f"_{name}" if re.match("[0-9]", name) else name)
+            valid = make_identifier(f"_{name}" if re.match("[0-9]", name) else name)
             return f"a{valid}" if valid.startswith("_") else valid
     return name
 
@@ -288,20 +290,20 @@ def spellings(name: str) -> frozenset[str]:
     >>> sorted(spellings("arm-2"))
     ['arm-2', 'arm_2', 'tn__arm2_g6']
     """
-    return frozenset(spelled(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
+    return frozenset(spell_name(name, style) for style in ("urdf", "usd", "identifier", "isaacsim"))
 
 
-def identifier(name: str) -> str:
+def make_identifier(name: str) -> str:
     """Return a name as OpenUSD's `TfMakeValidIdentifier` does: each byte that is not allowed becomes "_".
 
-    >>> identifier("1"), identifier("arm-2")
+    >>> make_identifier("1"), make_identifier("arm-2")
     ('_', 'arm_2')
     """
     octets = name.encode().decode("latin-1")
     return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"
 
 
-def transcoded(name: str) -> str:
+def transcode(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     The result begins with "tn__" and the allowed characters of the name. If there are allowed characters, "_"
@@ -312,7 +314,7 @@ def transcoded(name: str) -> str:
     is the number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
     proposals/transcoding_invalid_identifiers.
 
-    >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
+    >>> transcode("1"), transcode("arm-2"), transcode("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')
     """
     if _IDENTIFIER.fullmatch(name):
@@ -322,9 +324,9 @@ def transcoded(name: str) -> str:
     previous = 0
     for code, i in sorted((ord(letter), i) for i, letter in enumerate(name) if i not in set(placed)):
         number = (code - previous) * (len(placed) + 1) + sum(k < i for k in placed)
-        while number >= _CONTINUES:
-            rest, digit = divmod(number - _CONTINUES, len(_DIGITS) - _CONTINUES)
-            out += _DIGITS[_CONTINUES + digit]
+        while number >= _THRESHOLD:
+            rest, digit = divmod(number - _THRESHOLD, len(_DIGITS) - _THRESHOLD)
+            out += _DIGITS[_THRESHOLD + digit]
             number = rest
         out += _DIGITS[number]
         placed.append(i)

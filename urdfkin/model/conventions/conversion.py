@@ -17,34 +17,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.kinematics.inputs import scalars
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, skew
+from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
-from urdfkin.model.configuration_like import CoordinateLayout, Given
-from urdfkin.model.conventions.convention import Convention, JointRule, demand_unique, spelled
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
+from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
 #: Largest allowed difference (rad or m) between a mimic joint's value and the value from its mimic rule.
 _MIMIC_TOLERANCE = 1e-9
-_SWAPPED = [3, 4, 5, 0, 1, 2]
+_ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """One number of the target program's q or v: `factor * x[at] + zero`, where x is urdfkin's q or v.
+    """One number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `copy` is true for a
+    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `is_mimic` is true for a
     number of a mimic joint. The q and v of urdfkin contain no number for a mimic joint.
     """
 
     name: str
-    at: int
+    index: int
     factor: float = 1.0
     zero: float = 0.0
     part: str = ""
     unit: str = ""
-    copy: bool = False
+    is_mimic: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,28 +91,28 @@ class Conversion:
         self._urdf = urdf
         for name in convention.rules:
             self._index(name)
-        self._order = self._ordered()
+        self._order = self._find_order()
         self._columns, self._rates = list[_TargetNumber](), list[_TargetNumber]()
         self._blocks = list[_FreeJoint]()
-        self.joint_names = tuple(self._add(i) for i in self._order)
-        demand_unique(self.joint_names, convention.name)
-        self._prepare()
+        self.joint_names = tuple(self._add_joint(i) for i in self._order)
+        check_unique(self.joint_names, convention.name)
+        self._precompute()
 
     def __repr__(self) -> str:
         return f"<Conversion of {self.tree.name} to {self.convention.name}: nq {self.nq}, nv {self.nv}>"
 
     # -- layout --------------------------------------------------------------------------------------
 
-    def _ordered(self) -> list[int]:
+    def _find_order(self) -> list[int]:
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
-            return self._listed_order(moving)
+            return self._order_of_names(moving)
         if how.mimic == "none":
             moving -= {i for i in moving if tree.joints[i].mimic}
-        return [i for i in self._all_in_order() if i in moving]
+        return [i for i in self._sort_joints() if i in moving]
 
-    def _listed_order(self, moving: set[int]) -> list[int]:
+    def _order_of_names(self, moving: set[int]) -> list[int]:
         how = self.convention
         if not how.joints:
             raise InputError(
@@ -122,14 +122,17 @@ class Conversion:
                 " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
-        every = [(name, self._index(own.get(name, name))) for name in how.joints]
-        named = [(name, i) for name, i in every if self.tree.joints[i].lock is None]
+        all_names = [(name, self._index(own.get(name, name))) for name in how.joints]
+        named = [(name, i) for name, i in all_names if self.tree.joints[i].lock is None]
         order = [i for _, i in named]
         for name, i in named:
             if i not in moving:
                 raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
-        demand_unique([self.tree.joints[i].name for i in order], how.name)
-        joints, covered = self.tree.joints, {self.tree.q_index[i] for i in order if self._follows(i)}
+        check_unique([self.tree.joints[i].name for i in order], how.name)
+        joints, covered = (
+            self.tree.joints,
+            {self.tree.q_index[i] for i in order if self._determines_coordinate(i)},
+        )
         missing = [joints[i].name for i in sorted(moving - set(order)) if self.tree.q_index[i] not in covered]
         if missing:
             raise InputError(
@@ -142,7 +145,7 @@ class Conversion:
             raise UnknownNameError("joint", joint, names, where=f"{self.convention.name}, {self.tree.name}")
         return self.tree.joint_index(joint)
 
-    def _follows(self, i: int) -> bool:
+    def _determines_coordinate(self, i: int) -> bool:
         """Return whether a joint's value determines a coordinate.
 
         The value of a mimic joint with multiplier 0 does not determine the mimicked joint's coordinate.
@@ -150,32 +153,32 @@ class Conversion:
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
-    def _all_in_order(self) -> list[int]:
+    def _sort_joints(self) -> list[int]:
         tree, order = self.tree, self.convention.order
-        every = range(len(tree.joints))
+        all_joints = range(len(tree.joints))
         if order == "depth first, by name":
-            return list(every)
+            return list(all_joints)
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
         # The file does not contain a root joint that urdfkin added; the place -1 puts this joint first.
-        place = [written.get(name, -1) for name in names]
+        ranks = [written.get(name, -1) for name in names]
         if order == "name":
-            return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
+            return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
         if order == "file":
-            return sorted(every, key=place.__getitem__)
+            return sorted(all_joints, key=ranks.__getitem__)
         children: dict[int, list[int]] = {}
         for i, joint in enumerate(tree.joints):
             children.setdefault(joint.parent, []).append(i)
         if order.startswith("breadth first"):
-            of_joints = [joint.name for joint in tree.joints]
-            keys = of_joints if order.endswith(("by name", "fixed joints")) else place
+            joint_roundings = [joint.name for joint in tree.joints]
+            keys = joint_roundings if order.endswith(("by name", "fixed joints")) else ranks
             return self._breadth_first(children, keys, merged=not order.endswith("fixed joints"))
-        found, stack = [], sorted(children.get(0, []), key=place.__getitem__, reverse=True)
+        ordered_joints, stack = [], sorted(children.get(0, []), key=ranks.__getitem__, reverse=True)
         while stack:
-            found.append(i := stack.pop())
-            stack += sorted(children.get(i + 1, []), key=place.__getitem__, reverse=True)
-        return found
+            ordered_joints.append(i := stack.pop())
+            stack += sorted(children.get(i + 1, []), key=ranks.__getitem__, reverse=True)
+        return ordered_joints
 
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
@@ -186,26 +189,26 @@ class Conversion:
         """
 
         def below(link: int) -> list[int]:
-            found, links = list[int](), [link]
+            joints, links = list[int](), [link]
             # The loop also visits the links that it appends to the list.
             for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
-                    if self.tree.joints[i].unlocked.kind.nv or not merged:
-                        found.append(i)
+                    if self.tree.joints[i].original.kind.nv or not merged:
+                        joints.append(i)
                     else:
                         links.append(i + 1)
-            return sorted(found, key=keys.__getitem__)
+            return sorted(joints, key=keys.__getitem__)
 
         order = below(0)
         for i in order:
             order += below(i + 1)
         return order
 
-    def _add(self, i: int) -> str:
+    def _add_joint(self, i: int) -> str:
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
-        name = rule.name or spelled(joint.name, how.names)
+        name = rule.name or spell_name(joint.name, how.names)
         q, v = self.tree.q_index[i], self.tree.v_index[i]
         if joint.kind is JointKind.FLOATING:
             self._refuse_rule(joint)
@@ -230,9 +233,9 @@ class Conversion:
 
     def _add_axis(self, joint: Joint, rule: JointRule, name: str, q: int, v: int) -> None:
         how, turns = self.convention, joint.kind.turns
-        if rule.of and (rule.of == "angle") != turns:
+        if rule.quantity and (rule.quantity == "angle") != turns:
             raise InputError(
-                f"this `unit` is for a joint with {'an angle' if rule.of == 'angle' else 'a length'}",
+                f"this `unit` is for a joint with {'an angle' if rule.quantity == 'angle' else 'a length'}",
                 where=f"{how.name}: joint {joint.name}",
                 found=joint.kind.value,
             )
@@ -241,14 +244,15 @@ class Conversion:
             factor = rule.sign * (how.angle_factor if turns else 1.0)
         multiplier, offset = (joint.mimic.multiplier, joint.mimic.offset) if joint.mimic else (1.0, 0.0)
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
-        copy, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
+        is_mimic, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
             self._columns += [
-                _TargetNumber(f"{name}.{part}", q, factor, zero, part, copy=copy) for part in ("cos", "sin")
+                _TargetNumber(f"{name}.{part}", q, factor, zero, part, is_mimic=is_mimic)
+                for part in ("cos", "sin")
             ]
         else:
-            self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, copy))
-        self._rates.append(_TargetNumber(name, v, factor, unit=unit, copy=copy))
+            self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, is_mimic))
+        self._rates.append(_TargetNumber(name, v, factor, unit=unit, is_mimic=is_mimic))
 
     def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
@@ -286,22 +290,22 @@ class Conversion:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
         return np.zeros(3)
 
-    def _prepare(self) -> None:
+    def _precompute(self) -> None:
         columns, rates = self._columns, self._rates
         self.nq, self.nv = len(columns), len(rates)
-        self._q_index = np.array([c.at for c in columns], dtype=np.intp)
+        self._q_index = np.array([c.index for c in columns], dtype=np.intp)
         self._q_factor = np.array([1.0 if c.part else c.factor for c in columns])
         self._q_zero = np.array([0.0 if c.part else c.zero for c in columns])
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
         self._q_source = _sources(columns, self.tree.nq)
-        self._v_index = np.array([rate.at for rate in rates], dtype=np.intp)
+        self._v_index = np.array([rate.index for rate in rates], dtype=np.intp)
         self._v_factor = np.array([rate.factor for rate in rates])
         self._plain_v = bool((self._v_factor == 1.0).all()) and not self._blocks
         self._same_v = self._plain_v and np.array_equal(self._v_index, np.arange(self.tree.nv))
         self._v_source = _sources(rates, self.tree.nv)
-        self.angular_first = self.convention.six == "angular first"
+        self.angular_first = self.convention.six_vectors == "angular first"
 
     @property
     def has_pairs(self) -> bool:
@@ -314,22 +318,22 @@ class Conversion:
         return tuple(column.name for column in self._columns)
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
+    def velocity_names(self) -> tuple[str, ...]:
         """The target program's name of each element of v, and of each column of the Jacobian."""
         return tuple(rate.name for rate in self._rates)
 
-    def layout(self, what: str) -> CoordinateLayout:
+    def layout(self, symbol: str) -> CoordinateLayout:
         """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
-        if what != "q":
+        if symbol != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
-            return CoordinateLayout(what, self.rate_names, units, poses=lambda: rest)
+            return CoordinateLayout(symbol, self.velocity_names, units, poses=lambda: rest)
 
-        def named() -> dict[str, FloatArray]:
+        def convert_poses() -> dict[str, FloatArray]:
             return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
 
         units = tuple(column.unit for column in self._columns)
-        return CoordinateLayout(what, self.coordinate_names, units, poses=named)
+        return CoordinateLayout(symbol, self.coordinate_names, units, poses=convert_poses)
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
@@ -338,34 +342,43 @@ class Conversion:
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is the same in every configuration."""
-        return not self._blocks
+        """Whether `matrix` is the same in every configuration.
+
+        The matrix of a floating joint is constant if only the point of the linear velocity differs.
+        """
+        how = self.convention
+        return not any(
+            block.joint.kind is JointKind.PLANAR or "parent" in (how.linear, how.angular)
+            for block in self._blocks
+        )
 
     @property
-    def rate_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion also changes numbers."""
+    def velocity_permutation(self) -> NDArray[np.intp] | None:
+        """Indices with `v_tool = v[..., velocity_permutation]`; None if the conversion changes numbers."""
         return self._v_index.copy() if self._plain_v else None
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
         """Indices of each joint in the target program's q and v, by the joint's name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
-        found, q, v = {}, 0, 0
+        indices, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
             kind = self.tree.joints[i].kind
             nq = kind.nq_pinocchio if self.convention.continuous == 2 else kind.nq
-            found[name] = list(range(q, q + nq)), list(range(v, v + kind.nv))
+            indices[name] = list(range(q, q + nq)), list(range(v, v + kind.nv))
             q, v = q + nq, v + kind.nv
-        return found
+        return indices
 
     # -- vectors -------------------------------------------------------------------------------------
 
     @overload
-    def to(self, q: Given) -> FloatArray: ...
+    def to(self, q: ConfigurationLike) -> FloatArray: ...
     @overload
-    def to(self, q: Given, v: Given, a: Given | None = None) -> tuple[FloatArray, ...]: ...
     def to(
-        self, q: Given, v: Given | None = None, a: Given | None = None
+        self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
+    ) -> tuple[FloatArray, ...]: ...
+    def to(
+        self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
@@ -379,13 +392,13 @@ class Conversion:
         >>> bool(abs(qvel[:3] - robot.placement(q, "trunk")[:3, 0]).max() < 1e-15)  # in world axes
         True
         """
-        ours = self._ours(q, v, a)
-        found = [self._to_q(ours[0])]
-        if len(ours) > 1:
-            found.append(self._to_rates(ours[0], ours[1]))
-        if len(ours) > 2:
-            found.append(self._to_rates(ours[0], ours[2], ours[1]))
-        return found[0] if len(found) == 1 else tuple(found)
+        inputs = self._parse_inputs(q, v, a)
+        results = [self._to_q(inputs[0])]
+        if len(inputs) > 1:
+            results.append(self._to_rates(inputs[0], inputs[1]))
+        if len(inputs) > 2:
+            results.append(self._to_rates(inputs[0], inputs[2], inputs[1]))
+        return results[0] if len(results) == 1 else tuple(results)
 
     @overload
     def from_(self, q: ArrayLike) -> FloatArray: ...
@@ -406,25 +419,26 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        ours = [self._from_q(self._theirs(q, "q"))]
+        results = [self._from_q(self._check_target(q, "q"))]
         if v is not None:
-            ours.append(self._from_rates(ours[0], self._theirs(v, "v")))
+            results.append(self._from_rates(results[0], self._check_target(v, "v")))
         if a is not None:
-            ours.append(self._from_rates(ours[0], self._theirs(a, "a"), ours[1]))
-        return ours[0] if len(ours) == 1 else tuple(ours)
+            results.append(self._from_rates(results[0], self._check_target(a, "a"), results[1]))
+        return results[0] if len(results) == 1 else tuple(results)
 
-    def _ours(self, *values: Given | None) -> list[FloatArray]:
+    def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
         if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
-        return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
+        return [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
 
-    def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
-        array, width = scalars(value, what), self.nq if what == "q" else self.nv
+    def _check_target(self, value: ArrayLike, symbol: str) -> FloatArray:
+        array, width = as_finite(value, symbol), self.nq if symbol == "q" else self.nv
         if array.shape[-1:] != (width,):
-            names = self.coordinate_names if what == "q" else self.rate_names
+            names = self.coordinate_names if symbol == "q" else self.velocity_names
             raise InputError(
-                f"{what} needs {width} numbers in the convention {self.convention.name}: {', '.join(names)}",
+                f"{symbol} needs {width} numbers in the convention {self.convention.name}:"
+                f" {', '.join(names)}",
                 found=f"shape {array.shape}",
                 question=QuestionsSection.JOINT_ORDER,
             )
@@ -433,27 +447,27 @@ class Conversion:
     def _to_q(self, q: FloatArray) -> FloatArray:
         if self._same_q:
             return q
-        found: FloatArray = q[..., self._q_index]
+        target_q: FloatArray = q[..., self._q_index]
         if self._plain_q:
-            return found
-        found = found * self._q_factor + self._q_zero
+            return target_q
+        target_q = target_q * self._q_factor + self._q_zero
         for k, column in enumerate(self._columns):
             if column.part:
-                value = q[..., column.at] * column.factor + column.zero
-                found[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
-        return found
+                value = q[..., column.index] * column.factor + column.zero
+                target_q[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
+        return target_q
 
-    def _from_q(self, theirs: FloatArray) -> FloatArray:
+    def _from_q(self, target_q: FloatArray) -> FloatArray:
         if self._same_q:
-            return theirs
+            return target_q
         source = self._q_source
-        found: FloatArray = theirs[..., source]
+        q: FloatArray = target_q[..., source]
         if not self._plain_q:
-            found = (found - self._q_zero[source]) / self._q_factor[source]
+            q = (q - self._q_zero[source]) / self._q_factor[source]
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.part:
-                pair = theirs[..., k : k + 2]
+                pair = target_q[..., k : k + 2]
                 norm = np.linalg.norm(pair, axis=-1)
                 if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
                     raise InputError(
@@ -462,57 +476,57 @@ class Conversion:
                         found=f"{norm.max():.6g}",
                     )
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
-                found[..., at] = (angle - column.zero) / column.factor
-        copies = [(k, column) for k, column in enumerate(self._columns) if column.copy]
-        expected = self._to_q(found) if copies else theirs
+                q[..., at] = (angle - column.zero) / column.factor
+        copies = [(k, column) for k, column in enumerate(self._columns) if column.is_mimic]
+        expected = self._to_q(q) if copies else target_q
         for k, column in copies:
-            apart = float(np.abs(theirs[..., k] - expected[..., k]).max(initial=0.0))
-            if apart > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
+            difference = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
+            if difference > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
                 raise InputError(
                     "the value of a mimic joint contradicts its mimic rule",
                     where=column.name,
-                    found=f"{apart:.3g} rad or m from the rule",
+                    found=f"{difference:.3g} rad or m from the rule",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=QuestionsSection.MIMIC_JOINTS,
                 )
-        return found
+        return q
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return M x, or M x + M' v if v is given, with the matrix M of the module docstring."""
         if self._same_v:
             return x
-        found: FloatArray = x[..., self._v_index]
+        rates: FloatArray = x[..., self._v_index]
         if self._plain_v:
-            return found
-        found = found * self._v_factor
+            return rates
+        rates = rates * self._v_factor
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             B = self._block(block, q)
-            part = _times(B, x[..., own])
+            part = _multiply(B, x[..., own])
             if v is not None:
-                part = part + _times(self._block(block, q, v[..., own]), v[..., own])
-            found = _with(found, block.rows, part)
-        return found
+                part = part + _multiply(self._block(block, q, v[..., own]), v[..., own])
+            rates = _replace_slice(rates, block.rows, part)
+        return rates
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return M^-1 x or, if v is given, M^-1 (x - (dM/dt) v), with M = `matrix(q)`."""
         if self._same_v:
             return x
-        found: FloatArray = x[..., self._v_source]
+        rates: FloatArray = x[..., self._v_source]
         if self._plain_v:
-            return found
-        found = found / self._v_factor[self._v_source]
+            return rates
+        rates = rates / self._v_factor[self._v_source]
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             part = x[..., block.rows]
             if v is not None:
-                part = part - _times(self._block(block, q, v[..., own]), v[..., own])
-            found = _with(found, own, _times(_inverse(self._block(block, q)), part))
-        return found
+                part = part - _multiply(self._block(block, q, v[..., own]), v[..., own])
+            rates = _replace_slice(rates, own, _multiply(_inverse(self._block(block, q)), part))
+        return rates
 
     # -- matrices ------------------------------------------------------------------------------------
 
-    def matrix(self, q: Given | None = None) -> FloatArray:
+    def matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the matrix M (..., program's nv, nv) with v_tool = M v.
 
         If M depends on q, a call without q raises InputError.
@@ -521,40 +535,42 @@ class Conversion:
         M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:
             return M
-        if q is None:
+        if self.is_constant:
+            q = configuration.neutral(self.tree)
+        elif q is None:
             raise InputError(
                 "the matrix of a floating or planar joint depends on q", where=self.convention.name
             )
-        ours = configuration.checked(self.tree, q, "q")
-        M = np.tile(M, (*ours.shape[:-1], 1, 1))
+        configurations = configuration.parse_finite(self.tree, q, "q")
+        M = np.tile(M, (*configurations.shape[:-1], 1, 1))
         for block in self._blocks:
-            M[..., block.rows, block.v : block.v + block.joint.kind.nv] = self._block(block, ours)
+            M[..., block.rows, block.v : block.v + block.joint.kind.nv] = self._block(block, configurations)
         return M
 
-    def matrix_rate(self, q: Given, v: Given) -> FloatArray:
+    def matrix_rate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
         """Return M' (..., program's nv, nv), the time derivative of `matrix`."""
-        ours, rates = self._ours(q, v, None)
-        shape = np.broadcast_shapes(ours.shape[:-1], rates.shape[:-1])
-        found = np.zeros((*shape, self.nv, self.tree.nv))
+        configurations, velocities = self._parse_inputs(q, v, None)
+        shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
+        M_rate = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
-            found[..., block.rows, own] = self._block(block, ours, rates[..., own])
-        return found
+            M_rate[..., block.rows, own] = self._block(block, configurations, velocities[..., own])
+        return M_rate
 
-    def inverse_matrix(self, q: Given | None = None) -> FloatArray:
+    def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
         Several numbers of v_tool may depend on the same number of v. Then M^-1 uses one number of v_tool, and
         the columns of the other numbers are 0.
         """
         if not self._blocks:
-            found = np.zeros((self.tree.nv, self.nv))
-            found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
-            return found
+            M_inverse = np.zeros((self.tree.nv, self.nv))
+            M_inverse[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
+            return M_inverse
         M = self.matrix(q)
-        found = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
-        found[..., self._v_source] = _inverse(M[..., self._v_source, :])
-        return found
+        M_inverse = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
+        M_inverse[..., self._v_source] = _inverse(M[..., self._v_source, :])
+        return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return a joint's block (..., k, k) of `matrix`; with v, return the time derivative of the block."""
@@ -569,7 +585,7 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
-        R, own_axes = rotation_of(q[..., block.q + 3 : block.q + 7]), np.eye(3)
+        R, own_axes = rotation_from_quaternion(q[..., block.q + 3 : block.q + 7]), np.eye(3)
         if v is not None:
             R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
         own_axes = np.broadcast_to(own_axes, R.shape)
@@ -580,104 +596,113 @@ class Conversion:
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
         B = np.zeros((*A.shape[:-2], 6, 6))
         B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
-        return B if self.convention.base_v == "linear first" else B[..., _SWAPPED, :]
+        return B if self.convention.base_v == "linear first" else B[..., _ANGULAR_FIRST, :]
 
     # -- results -------------------------------------------------------------------------------------
 
-    def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
+    def reorder_six_vector(self, x: ArrayLike, axis: int = -1) -> FloatArray:
         """Exchange linear and angular parts of six-vectors if the target program has the angular part first.
 
         A second call restores the original order.
 
         >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").convention("drake").six([1, 2, 3, 4, 5, 6]).tolist()
+        >>> drake = urdfkin.load("planar_two_link").convention("drake")
+        >>> drake.reorder_six_vector([1, 2, 3, 4, 5, 6]).tolist()
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
         array = np.asarray(x, dtype=np.float64)
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
-        return np.take(array, _SWAPPED, axis) if self.angular_first else array
+        return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array
 
-    def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+    def jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1."""
-        return self.columns(q, self.six(J, -2))
+        return self.columns(q, self.reorder_six_vector(J, -2))
 
-    def columns(self, q: Given, J: ArrayLike) -> FloatArray:
+    def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
         The rows must have the same meaning in both conventions, such as derivatives of Euler angles. If
         several columns of the target program belong to one column of J, InputError is raised.
         """
-        self._demand_own_columns()
+        self._check_columns()
         array = np.asarray(J, dtype=np.float64)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_index]
-        return array @ _for_frames(self.inverse_matrix(q), array.ndim)
+        return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
 
-    def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+    def from_jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
 
         The column of a mimic joint is added to the mimicked joint's column.
         """
-        array = self.six(J, -2)
-        return array @ _for_frames(self.matrix(q), array.ndim)
+        array = self.reorder_six_vector(J, -2)
+        return array @ _add_frame_axis(self.matrix(q), array.ndim)
 
-    def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
+    def jacobian_rate(
+        self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
+    ) -> FloatArray:
         """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
-        found = self.jacobian(q, rate)
-        if not self._blocks:
-            return found
+        converted = self.jacobian(q, rate)
+        if self.is_constant:
+            return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
-        array = self.six(J, -2)
-        return found + array @ _for_frames(change, array.ndim)
+        array = self.reorder_six_vector(J, -2)
+        return converted + array @ _add_frame_axis(change, array.ndim)
 
-    def hessian(self, q: Given, J: ArrayLike, H: ArrayLike) -> FloatArray:
+    def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
         """Convert a Jacobian's derivatives H (..., 6, nv, nv) with respect to the joint coordinates."""
-        self._demand_own_columns()
-        inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)
-        W = _for_frames(inverse, columns.ndim)
-        found: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
-        if self._blocks:
+        self._check_columns()
+        inverse, tensor, columns = (
+            self.inverse_matrix(q),
+            self.reorder_six_vector(H, -3),
+            self.reorder_six_vector(J, -2),
+        )
+        W = _add_frame_axis(inverse, columns.ndim)
+        converted: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
+        if not self.is_constant:
             change = np.zeros((*inverse.shape, self.nv))
             for j in range(self.nv):
                 along = self.matrix_rate(q, inverse[..., j])
                 change[..., j] = -inverse @ along @ inverse
             lifted = change if columns.ndim == change.ndim - 1 else change[..., None, :, :, :]
-            found += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
-        return found
+            converted += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
+        return converted
 
-    def result(
+    def convert_result(
         self,
         quantity: str,
-        ours: Sequence[FloatArray],
+        inputs: Sequence[FloatArray],
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
-        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The method calls `jacobian`
+        `inputs` is q, or q and v, or q, v and a, in urdfkin's convention. The method calls `jacobian`
         only to convert a Hessian or the time derivative of a Jacobian. A placement is returned unchanged, and
         an undefined conversion raises InputError.
         """
         if quantity == "placement":
             return result
         if quantity in ("velocity", "acceleration"):
-            return self.six(result)
+            return self.reorder_six_vector(result)
         if quantity == "jacobian":
-            return self.jacobian(ours[0], result)
+            return self.jacobian(inputs[0], result)
         if quantity == "jacobian rate":
-            return self.jacobian_rate(ours[0], ours[1], jacobian(), result)
+            return self.jacobian_rate(inputs[0], inputs[1], jacobian(), result)
         if quantity == "hessian":
-            return self.hessian(ours[0], jacobian(), result)
+            return self.hessian(inputs[0], jacobian(), result)
         raise InputError(
             "a convention does not define how to convert this quantity",
             where=self.convention.name,
             found=quantity,
         )
 
-    def _demand_own_columns(self) -> None:
-        copies = (rate.name for k, rate in enumerate(self._rates) if rate.copy and k not in self._v_source)
+    def _check_columns(self) -> None:
+        copies = (
+            rate.name for k, rate in enumerate(self._rates) if rate.is_mimic and k not in self._v_source
+        )
         if (name := next(copies, None)) is not None:
             raise InputError(
                 f"{self.convention.title or self.convention.name} has a Jacobian column for each mimic"
@@ -696,37 +721,37 @@ class Reordering:
     factor: tuple[float, ...]
     zero: tuple[float, ...]
 
-    def code(self, to: str, of: str) -> str:
-        """Return one line of Python code that computes the variable `to` from the variable `of` with NumPy.
+    def code(self, target: str, source: str) -> str:
+        """Return one line of NumPy code that computes the variable `target` from the variable `source`.
 
         >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'
         """
         same = self.index == tuple(range(len(self.index)))
-        line = of if same else f"{of}[..., {list(self.index)}]"
+        line = source if same else f"{source}[..., {list(self.index)}]"
         if any(factor != 1.0 for factor in self.factor):
             line += f" * np.array({list(self.factor)})"
         if any(self.zero):
             line += f" + np.array({list(self.zero)})"
-        return f"{to} = {line}"
+        return f"{target} = {line}"
 
 
-def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
+def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the `Reordering` that converts "q" or "v" between two conventions; None if none exists.
 
     A `Reordering` cannot convert an angle to its cosine and sine, or a velocity to a different frame.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
-    >>> reordering("q", robot.convention("isaaclab"), robot.convention("mujoco")).index
+    >>> find_reordering("q", robot.convention("isaaclab"), robot.convention("mujoco")).index
     (1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10)
     """
-    if what == "q":
+    if symbol == "q":
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None
         own, other = start._columns, end._columns
         index = tuple(
-            next(k for k, c in enumerate(own) if (c.at, c.part) == (x.at, x.part) and not c.copy)
+            next(k for k, c in enumerate(own) if (c.index, c.part) == (x.index, x.part) and not c.is_mimic)
             for x in other
         )
         if any(
@@ -744,7 +769,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
         start._blocks or end._blocks
     ):
         return None
-    index = tuple(start._v_source[rate.at] for rate in end._rates)
+    index = tuple(start._v_source[rate.index] for rate in end._rates)
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
     return Reordering(index, factors, (0.0,) * len(index))
@@ -757,12 +782,15 @@ def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     other number.
     """
     return [
-        min((k for k, x in enumerate(numbers) if x.at == at and x.factor), key=lambda k: numbers[k].copy)
+        min(
+            (k for k, x in enumerate(numbers) if x.index == at and x.factor),
+            key=lambda k: numbers[k].is_mimic,
+        )
         for at in range(count)
     ]
 
 
-def _times(B: FloatArray, x: FloatArray) -> FloatArray:
+def _multiply(B: FloatArray, x: FloatArray) -> FloatArray:
     return (B @ x[..., np.newaxis])[..., 0]
 
 
@@ -770,7 +798,7 @@ def _inverse(B: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(B), dtype=np.float64)
 
 
-def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
+def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
     shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
@@ -778,6 +806,6 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
     return array
 
 
-def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
+def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
     """Insert an axis into M (..., k, l) if a Jacobian with `ndim` axes has an axis for several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

@@ -4,10 +4,10 @@ Joints at two matched bodies are paired by the names that the user gives, by equ
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
-the mimic rules must correspond, unless `Congruence.ignore_rules` was called. The value of the joint before a
-subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the result
-depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the other.
-`Congruence` stores the result of each such case, so that the search is fast even for long chains.
+the mimic rules must correspond, unless `SubtreeMatcher.ignore_rules` was called. The value of the joint
+before a subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the
+result depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the
+other. `SubtreeMatcher` stores the result of each such case, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -22,41 +22,41 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.model.chain import LEAST_SIZE
+from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.mechanisms.mechanism import (
-    ALONG,
     IDENTITY,
+    PARALLEL_TOLERANCE,
     Edge,
     Mechanism,
     Screw,
     Tolerance,
     angle_from_to,
-    between_lines,
+    line_difference,
     pose_difference,
     screw_motion,
     smallest_motion,
 )
 from urdfkin.model.tree import FloatArray, JointKind, inverse
 
-Pair = tuple[Edge, Edge]
-Via = tuple[Edge | None, Edge | None]
+EdgePair = tuple[Edge, Edge]
+PreviousEdges = tuple[Edge | None, Edge | None]
 
 
-def family(kind: JointKind) -> str:
+def motion_type(kind: JointKind) -> str:
     """Return "turns" for a revolute or continuous joint, else the name of the joint's kind."""
     return "turns" if kind.turns else str(kind.value)
 
 
-class Pairing:
-    """Find corresponding joints of A and B; `given` maps joint names of A to joint names of B."""
+class JointMatcher:
+    """Find corresponding joints of A and B; `name_map` maps joint names of A to joint names of B."""
 
-    def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
-        self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
-        self._named = {name for pair in given.items() for name in pair}
+    def __init__(self, a: Mechanism, b: Mechanism, name_map: Mapping[str, str], tolerance: Tolerance) -> None:
+        self.a, self.b, self.name_map, self._tolerance = a, b, name_map, tolerance
+        self._named = {name for pair in name_map.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
-            tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
+            tuple[tuple[int, int], PreviousEdges], tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]
         ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
@@ -70,18 +70,18 @@ class Pairing:
         return known
 
     def edges(
-        self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
-    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+        self, bodies: tuple[int, int], via: PreviousEdges, G: FloatArray, XC: FloatArray
+    ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
         `via` contains the joints before these bodies. G (4, 4) moves A's body from its zero configuration to
         the current pose of B's body. XC (4, 4) moves B's body from its zero configuration to its current
         pose.
         """
-        named, left_a, left_b = self.by_names(bodies, via)
+        named, left_a, left_b = self.pair_by_name(bodies, via)
         pairs = list(named)
         rest = sorted(
-            (self._unlikeness(one, other), i, j)
+            (self._dissimilarity(one, other), i, j)
             for i, one in self._geometries(self.a, bodies[0], left_a, G)
             for j, other in self._geometries(self.b, bodies[1], left_b, XC)
             if one.kind == other.kind
@@ -98,14 +98,14 @@ class Pairing:
             [edge for j, edge in enumerate(left_b) if j not in taken_b],
         )
 
-    def by_names(
-        self, bodies: tuple[int, int], via: Via
-    ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+    def pair_by_name(
+        self, bodies: tuple[int, int], via: PreviousEdges
+    ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         if (known := self._by_names.get((bodies, via))) is None:
-            left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
-            left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
-            pairs = list[Pair]()
-            for e, f in self._pairs_by_name(bodies, list(left_a), list(left_b)):
+            left_a = [edge for edge in self.a.edges_by_body[bodies[0]] if edge is not via[0]]
+            left_b = [edge for edge in self.b.edges_by_body[bodies[1]] if edge is not via[1]]
+            pairs = list[EdgePair]()
+            for e, f in self._name_pairs(bodies, list(left_a), list(left_b)):
                 if e in left_a and f in left_b:
                     pairs.append((e, f))
                     left_a.remove(e)
@@ -113,48 +113,52 @@ class Pairing:
             known = self._by_names[bodies, via] = pairs, left_a, left_b
         return known
 
-    def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
+    def has_same_shape(self, bodies: tuple[int, int], via: PreviousEdges) -> bool:
         """Return whether two subtrees have the same branching and the same kinds of joints."""
         shapes = (
-            sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
+            sorted(self._signature(m, body, edge) for edge in m.edges_by_body[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
         )
         return next(shapes) == next(shapes)
 
-    def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
+    def have_equal_subtrees(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
-    def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
+    def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
         """Return whether each axis at A's body coincides with an axis at B's body, after B moves by X."""
         return all(
             any(
-                family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
+                motion_type(self.a.joint(e).kind) == motion_type(self.b.joint(f).kind)
                 and self._tolerance.holds(*self.mismatch(e, f, IDENTITY, X))
-                for f in self.b.edges_of[bodies[1]]
+                for f in self.b.edges_by_body[bodies[1]]
             )
-            for e in self.a.edges_of[bodies[0]]
+            for e in self.a.edges_by_body[bodies[0]]
             if self.a.joint(e).kind.has_axis
         )
 
-    def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
+    def rank_candidates(
+        self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
+    ) -> list[Edge]:
         """Return the joints of B, most similar to `e` first; omit joints that the user matched.
 
         The motion X (4, 4) moves B from its zero configuration to the pose of A.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
-        ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
+        ranked = sorted((self._dissimilarity(one[0][1], other), j) for j, other in others) if one else []
         return [edges[j] for _, j in ranked]
 
-    def _pairs_by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
-        by_name = {self.b.joint(f).name: f for f in theirs}
-        for e in ours:
+    def _name_pairs(
+        self, bodies: tuple[int, int], edges_a: list[Edge], edges_b: list[Edge]
+    ) -> Iterator[EdgePair]:
+        by_name = {self.b.joint(f).name: f for f in edges_b}
+        for e in edges_a:
             name = self.a.joint(e).name
-            if (f := by_name.get(self.given.get(name, name))) is not None:
+            if (f := by_name.get(self.name_map.get(name, name))) is not None:
                 yield e, f
-        for e in ours:
+        for e in edges_a:
             links = {self.a.labels[k] for k in self.a.bodies[e.other_body(bodies[0])]}
-            for f in theirs:
+            for f in edges_b:
                 if links & {self.b.labels[k] for k in self.b.bodies[f.other_body(bodies[1])]}:
                     yield e, f
 
@@ -167,9 +171,11 @@ class Pairing:
             if mechanism.joint(edge).name not in self._named
         ]
 
-    def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
+    def _dissimilarity(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
         angle, shift = one.mismatch(other)
-        axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
+        axes = (
+            0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, MIN_ROBOT_SIZE) + shift
+        )
         origins = math.dist(one.origin, other.origin)
         is_opposite = bool(one.screw.direction @ other.screw.direction < 0.0)
         return one.shape != other.shape, axes, origins + self.a.size * is_opposite
@@ -180,21 +186,21 @@ class Pairing:
             beyond = edge.other_body(body)
             below = sorted(
                 self._signature(mechanism, beyond, other)
-                for other in mechanism.edges_of[beyond]
+                for other in mechanism.edges_by_body[beyond]
                 if other is not edge
             )
-            known = f"({family(mechanism.joint(edge).kind)}{''.join(below)})"
+            known = f"({motion_type(mechanism.joint(edge).kind)}{''.join(below)})"
             self._signatures[key] = known
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
         """Return the angle (rad) and distance (m) between two axes; (0, 0) for different kinds of joints."""
-        kind = family(self.a.joint(e).kind)
-        if kind != family(self.b.joint(f).kind):
+        kind = motion_type(self.a.joint(e).kind)
+        if kind != motion_type(self.b.joint(f).kind):
             return 0.0, 0.0
         if kind == "planar":
             return _JointGeometry.of(self.a, e, G).mismatch(_JointGeometry.of(self.b, f, XC))
-        return _lines_apart(kind, self.a.screw(e).moved(G), self.b.screw(f).moved(XC))
+        return _line_difference(kind, self.a.screw(e).transform(G), self.b.screw(f).transform(XC))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,21 +215,21 @@ class _JointGeometry:
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        pose = T @ mechanism.homes[edge.joint + 1]
-        screw = mechanism.screw(edge).moved(T)
-        return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
+        pose = T @ mechanism.zero_poses[edge.joint + 1]
+        screw = mechanism.screw(edge).transform(T)
+        return cls(motion_type(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
-            return between_lines(*normals, placed=False)
-        return _lines_apart(self.kind, self.screw, other.screw)
+            return line_difference(*normals, with_distance=False)
+        return _line_difference(self.kind, self.screw, other.screw)
 
 
-def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
+def _line_difference(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
     if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
         return 0.0, 0.0
-    return between_lines(s, t, placed=kind == "turns")
+    return line_difference(s, t, with_distance=kind == "turns")
 
 
 _Some = TypeVar("_Some")
@@ -241,8 +247,8 @@ class Axis:
     turns: bool
     reference: Screw
 
-    def moved(self, T: FloatArray) -> Axis:
-        return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
+    def transform(self, T: FloatArray) -> Axis:
+        return Axis(self.screw.transform(T), self.turns, self.reference.transform(T))
 
     def height(self, u: FloatArray) -> float | None:
         """Return the coordinate u . p (m), where p is the point of the reference line nearest to the axis.
@@ -251,33 +257,35 @@ class Axis:
         """
         s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
-        if not self.turns or 1.0 - along_s**2 < ALONG**2:
+        if not self.turns or 1.0 - along_s**2 < PARALLEL_TOLERANCE**2:
             return None
         offset = s.point - start.point
-        foot = float(offset @ start.direction - along_s * (offset @ s.direction)) / (1.0 - along_s**2)
-        return float(u @ (start.point + foot * start.direction))
+        distance = float(offset @ start.direction - along_s * (offset @ s.direction)) / (1.0 - along_s**2)
+        return float(u @ (start.point + distance * start.direction))
 
 
-def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield values (rad or m) of a joint that may move the axis `theirs` to the axis `ours`.
+def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
+    """Yield values (rad or m) of a joint that may move the axis `axis_b` to the axis `axis_a`.
 
     The axis of this joint is u.
     """
     if not turns:
-        heights = ours.height(u.direction), theirs.height(u.direction)
+        heights = axis_a.height(u.direction), axis_b.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
             yield heights[0] - heights[1]
         return
-    s, t = ours.screw, theirs.screw
-    guess = angle_from_to(u.direction, t.direction, s.direction)
-    if guess is not None:
-        yield guess
-        yield remainder(guess + pi, 2.0 * pi)
-    if ours.turns:
-        feet = [line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (t, s)]
-        guess = angle_from_to(u.direction, feet[0] - u.point, feet[1] - u.point)
-        if guess is not None:
-            yield guess
+    s, t = axis_a.screw, axis_b.screw
+    candidate = angle_from_to(u.direction, t.direction, s.direction)
+    if candidate is not None:
+        yield candidate
+        yield remainder(candidate + pi, 2.0 * pi)
+    if axis_a.turns:
+        perpendiculars = [
+            line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (t, s)
+        ]
+        candidate = angle_from_to(u.direction, perpendiculars[0] - u.point, perpendiculars[1] - u.point)
+        if candidate is not None:
+            yield candidate
 
 
 def later_axes(
@@ -291,7 +299,7 @@ def later_axes(
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, reference[0].direction)) < ALONG:
+        if np.linalg.norm(np.cross(screws[0].direction, reference[0].direction)) < PARALLEL_TOLERANCE:
             beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
             yield from later_axes(mechanisms, (e, f), beyond, screws if axes[0].turns else reference)
 
@@ -302,16 +310,16 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     If possible, the poses also align the axes of other joints.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
-    for (ours, theirs), before, after in firsts:
-        lines = ours.screw, theirs.screw
+    for (axis_a, axis_b), before, after in firsts:
+        lines = axis_a.screw, axis_b.screw
         # If no joint follows, other axes of the same body determine the pose, as for a drone's rotors.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
-        for start in (theirs.screw, theirs.screw.reversed()):
-            K = smallest_motion(start, ours.screw, turns=True)[0]
-            for angle in _guesses(ours.screw, [*before, *others], K, turns=True):
-                X = screw_motion(ours.screw, angle, turns=True) @ K
-                for shift in _guesses(ours.screw, others, X, turns=False):
-                    yield screw_motion(ours.screw, shift, turns=False) @ X
+        for start in (axis_b.screw, axis_b.screw.reverse()):
+            K = smallest_motion(start, axis_a.screw, turns=True)[0]
+            for angle in _candidates(axis_a.screw, [*before, *others], K, turns=True):
+                X = screw_motion(axis_a.screw, angle, turns=True) @ K
+                for shift in _candidates(axis_a.screw, others, X, turns=False):
+                    yield screw_motion(axis_a.screw, shift, turns=False) @ X
 
 
 def root_poses_by_siblings(
@@ -322,52 +330,54 @@ def root_poses_by_siblings(
     If these axes do not determine the shift along the first axis, the axes of later joints determine it.
     """
     edges = _with_axes(a, bodies[0])
-    ours = [_axis(a, edge) for edge in edges]
-    turning = [i for i, axis in enumerate(ours) if axis.turns]
+    axes_a = [_axis(a, edge) for edge in edges]
+    turning = [i for i, axis in enumerate(axes_a) if axis.turns]
     if len(edges) < 2 or not turning:
         return
     first = turning[0]
-    u = ours[first].screw
-    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in ours]
+    u = axes_a[first].screw
+    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in axes_a]
     rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -sines[i])
-    second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
-    theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
-    for f, axis in theirs[first]:
+    second, others = rest[0], [i for i in rest[1:] if axes_a[i].turns][:1]
+    axes_b = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
+    for f, axis in axes_b[first]:
         lines = u, axis.screw
         pair_of = partial(_with_reference, lines)
         beyond = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
         far = list(later_axes((a, b), (edges[first], f), beyond, lines))
-        for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
+        for start, (g, other) in product((axis.screw, axis.screw.reverse()), axes_b[second]):
             if g is f:
                 continue
-            pair = pair_of(ours[second], other)
+            pair = pair_of(axes_a[second], other)
             more = [
-                pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
+                pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
             # So the axes of the next joints must determine the shift along u.
-            if not ours[second].turns:
+            if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
             K = smallest_motion(start, u, turns=True)[0]
-            for angle in zero_candidates(u, pair[0], pair[1].moved(K), turns=True):
+            for angle in zero_candidates(u, pair[0], pair[1].transform(K), turns=True):
                 X = screw_motion(u, angle, turns=True) @ K
-                shifts = list(zero_candidates(u, pair[0], pair[1].moved(X), turns=False))
-                for shift in shifts or _guesses(u, [*more, *far], X, turns=False):
+                shifts = list(zero_candidates(u, pair[0], pair[1].transform(X), turns=False))
+                for shift in shifts or _candidates(u, [*more, *far], X, turns=False):
                     yield screw_motion(u, shift, turns=False) @ X
 
 
-def _with_reference(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
-    return replace(ours, reference=lines[0]), replace(theirs, reference=lines[1])
+def _with_reference(lines: Both[Screw], axis_a: Axis, axis_b: Axis) -> Both[Axis]:
+    return replace(axis_a, reference=lines[0]), replace(axis_b, reference=lines[1])
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
-    return [edge for edge in mechanism.edges_of[body] if mechanism.joint(edge).kind.has_axis]
+    return [edge for edge in mechanism.edges_by_body[body] if mechanism.joint(edge).kind.has_axis]
 
 
-def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
-    return [x for ours, theirs in pairs for x in zero_candidates(u, ours, theirs.moved(X), turns)] or [0.0]
+def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
+    return [
+        x for axis_a, axis_b in pairs for x in zero_candidates(u, axis_a, axis_b.transform(X), turns)
+    ] or [0.0]
 
 
 def _first_axes(
@@ -378,7 +388,7 @@ def _first_axes(
     Each item contains this pair, the pairs of prismatic axes before it, and the pairs of axes after it. If
     two branches have only pairs of prismatic axes, the last of these pairs replaces the revolute pair.
     """
-    found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
+    first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
@@ -386,18 +396,22 @@ def _first_axes(
         )
         lines = pair[0].screw, pair[1].screw
         deeper = [] if pair[0].turns else _first_axes(mechanisms, (e, f), beyond, (*near, pair))
-        found += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
-    return found
+        first_axes += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
+    return first_axes
 
 
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    ours, theirs = (
-        [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
+    edges_a, edges_b = (
+        [
+            edge
+            for edge in mechanism.edges_by_body[body]
+            if edge is not by and mechanism.joint(edge).kind.has_axis
+        ]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
     )
-    for e, f in product(ours, theirs):
+    for e, f in product(edges_a, edges_b):
         if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:
             yield e, f
 
@@ -409,13 +423,13 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 
 #: Function that proposes poses of B's body after two matched joints.
 #: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joints.
-Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
+ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: Maximum number of joint pairs that the search for an exact match tries at two bodies.
 MOST_ASSIGNMENTS = 5000
 
 #: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
-Rates = Mapping[str, tuple[str, float]]
+VelocityRatios = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -423,94 +437,101 @@ class _Match:
     """The pose X (4, 4) of B's body after two joints, and the coordinates of the matched subtrees."""
 
     X: FloatArray
-    rates: Rates
+    ratios: VelocityRatios
 
 
-class Congruence:
+class SubtreeMatcher:
     """Find subtrees of A and B that match exactly (module docstring)."""
 
     def __init__(
-        self, a: Mechanism, b: Mechanism, pairing: Pairing, tolerance: Tolerance, poses: Poses
+        self,
+        a: Mechanism,
+        b: Mechanism,
+        joint_matcher: JointMatcher,
+        tolerance: Tolerance,
+        poses: ProposePoses,
     ) -> None:
-        self.a, self.b, self.pairing, self.tolerance, self.poses = a, b, pairing, tolerance, poses
-        self._known = dict[tuple[int, int, int], list[tuple[FloatArray, _Match | None]]]()
+        self.a, self.b, self.joint_matcher, self.tolerance, self.poses = a, b, joint_matcher, tolerance, poses
+        self._cache = dict[tuple[int, int, int], list[tuple[FloatArray, _Match | None]]]()
         self._rules = True
 
     def ignore_rules(self) -> None:
         self._rules = False
-        self._known.clear()
+        self._cache.clear()
 
-    def joint_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
+    def joint_pairs(
+        self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
+    ) -> Sequence[EdgePair] | None:
         """Return the joint pairs if the subtrees match exactly after B moves by X (4, 4), else None."""
-        found = self._at(bodies, via, X)
+        found = self._match_bodies(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of B's body after joint f for an exact match, else None."""
-        found = self._behind(e, f, bodies, X)
+        found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 
-    def _at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> tuple[Sequence[Pair], Rates] | None:
-        if not self.pairing.same_shape(bodies, via):
+    def _match_bodies(
+        self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
+    ) -> tuple[Sequence[EdgePair], VelocityRatios] | None:
+        if not self.joint_matcher.has_same_shape(bodies, via):
             return None
-        for i, j in self.pairing.links(*bodies):
-            if not self.tolerance.holds(*pose_difference(self.a.homes[i], X @ self.b.homes[j])):
+        for i, j in self.joint_matcher.links(*bodies):
+            if not self.tolerance.holds(*pose_difference(self.a.zero_poses[i], X @ self.b.zero_poses[j])):
                 return None
-        named, left_a, left_b = self.pairing.by_names(bodies, via)
-        if len(left_a) != len(left_b) or not all(self._lie_alike(e, f, X) for e, f in named):
+        named, left_a, left_b = self.joint_matcher.pair_by_name(bodies, via)
+        if len(left_a) != len(left_b) or not all(self._axes_coincide(e, f, X) for e, f in named):
             return None
         candidates = [[f] for _, f in named]
         for e in left_a:
-            some = self.pairing.likeliest(bodies, e, left_b, X)
-            candidates.append([f for f in some if self._lie_alike(e, f, X)])
-        return self._assigned(
-            [*(e for e, _ in named), *left_a], candidates, bodies, X, [MOST_ASSIGNMENTS], {}
-        )
+            some = self.joint_matcher.rank_candidates(bodies, e, left_b, X)
+            candidates.append([f for f in some if self._axes_coincide(e, f, X)])
+        return self._assign([*(e for e, _ in named), *left_a], candidates, bodies, X, [MOST_ASSIGNMENTS], {})
 
-    def _assigned(
+    def _assign(
         self,
-        left: Sequence[Edge],
+        edges: Sequence[Edge],
         candidates: Sequence[Sequence[Edge]],
         bodies: tuple[int, int],
         X: FloatArray,
         tries: list[int],
-        rates: Rates,
-    ) -> tuple[Sequence[Pair], Rates] | None:
-        if not left:
-            return [], rates
-        at = min(range(len(left)), key=lambda i: len(candidates[i]))
-        for f in candidates[at]:
+        ratios: VelocityRatios,
+    ) -> tuple[Sequence[EdgePair], VelocityRatios] | None:
+        if not edges:
+            return [], ratios
+        k = min(range(len(edges)), key=lambda i: len(candidates[i]))
+        for f in candidates[k]:
             tries[0] -= 1
-            found = self._behind(left[at], f, bodies, X) if tries[0] >= 0 else None
-            both = None if found is None else self._together(rates, found.rates)
+            match = self._match_subtrees(edges[k], f, bodies, X) if tries[0] >= 0 else None
+            both = None if match is None else self._merge_ratios(ratios, match.ratios)
             if both is None:
                 continue
-            others = [[g for g in some if g is not f] for i, some in enumerate(candidates) if i != at]
-            rest = self._assigned([*left[:at], *left[at + 1 :]], others, bodies, X, tries, both)
+            others = [[g for g in some if g is not f] for i, some in enumerate(candidates) if i != k]
+            rest = self._assign([*edges[:k], *edges[k + 1 :]], others, bodies, X, tries, both)
             if rest is not None:
-                return [(left[at], f), *rest[0]], rest[1]
+                return [(edges[k], f), *rest[0]], rest[1]
         return None
 
-    def _behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> _Match | None:
-        if not self._lie_alike(e, f, X):
+    def _match_subtrees(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> _Match | None:
+        if not self._axes_coincide(e, f, X):
             return None
-        known = self._known.setdefault((e.joint, f.joint, bodies[0]), [])
-        for other, match in known:
-            if self._same_case(e, other, X):
+        cases = self._cache.setdefault((e.joint, f.joint, bodies[0]), [])
+        for other, match in cases:
+            if self._is_same_case(e, other, X):
                 return match
         beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
-        found, own = None, self._rate(e, f, bodies, X)
-        if self.pairing.same_shape(beyond, (e, f)):
+        match, own = None, self._velocity_ratio(e, f, bodies, X)
+        if self.joint_matcher.has_same_shape(beyond, (e, f)):
             for there in _distinct(self.poses(beyond, (e, f), X)):
-                some = self._at(beyond, (e, f), there)
-                rates = None if some is None else self._together(own, some[1])
-                if rates is not None:
-                    found = _Match(there, rates)
+                found_pairs = self._match_bodies(beyond, (e, f), there)
+                ratios = None if found_pairs is None else self._merge_ratios(own, found_pairs[1])
+                if ratios is not None:
+                    match = _Match(there, ratios)
                     break
-        known.append((X, found))
-        return found
+        cases.append((X, match))
+        return match
 
-    def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
+    def _velocity_ratio(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> VelocityRatios:
         """Return the coordinates that move two joints, and the ratio of the coordinates' velocities."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
@@ -525,33 +546,33 @@ class Congruence:
         back = (e.outer == bodies[0]) != (f.outer == bodies[1])
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
-    def _together(self, some: Rates, others: Rates) -> Rates | None:
+    def _merge_ratios(self, some: VelocityRatios, others: VelocityRatios) -> VelocityRatios | None:
         """Merge two sets of matched coordinates; return None if the sets contradict each other."""
         for x in some.keys() & others.keys():
-            (y, rate), (other, other_rate) = some[x], others[x]
-            tolerance = self.tolerance.angle * max(1.0, abs(other_rate))
-            if y != other or abs(rate - other_rate) > tolerance:
+            (y, ratio), (other, other_ratio) = some[x], others[x]
+            tolerance = self.tolerance.angle * max(1.0, abs(other_ratio))
+            if y != other or abs(ratio - other_ratio) > tolerance:
                 return None
         both = {**some, **others}
         return both if len({y for y, _ in both.values()}) == len(both) else None
 
-    def _lie_alike(self, e: Edge, f: Edge, X: FloatArray) -> bool:
-        kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
+    def _axes_coincide(self, e: Edge, f: Edge, X: FloatArray) -> bool:
+        kinds = motion_type(self.a.joint(e).kind), motion_type(self.b.joint(f).kind)
         if kinds[0] != kinds[1] or kinds[0] == "fixed":
             return False
-        return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
+        return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
-    def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
+    def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
         """Return whether a motion of the joint leads from the pose X to the pose `other`.
 
         For a planar joint, the result is true only if the two poses are equal.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:
-            return family(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))
+            return motion_type(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))
         screw, D = self.a.screw(e), other @ inverse(X)
         if kind.turns:
-            moved = screw.moved(D)
+            moved = screw.transform(D)
             return self.tolerance.holds(
                 float(np.linalg.norm(moved.direction - screw.direction)),
                 float(np.linalg.norm(moved.point - screw.point)),

@@ -19,11 +19,11 @@ from itertools import chain, islice
 from typing import TypeVar
 
 from urdfkin.model.mechanisms.joint_matching import (
-    Congruence,
-    Pair,
-    Pairing,
-    family,
+    EdgePair,
+    JointMatcher,
+    SubtreeMatcher,
     later_axes,
+    motion_type,
     root_poses_by_axes,
     root_poses_by_siblings,
     zero_candidates,
@@ -40,7 +40,7 @@ from urdfkin.model.mechanisms.mechanism import (
     Screw,
     Tolerance,
     angle_about,
-    between_lines,
+    line_difference,
     nearest_planar_pose,
     planar_counterpart,
     pose_difference,
@@ -52,14 +52,14 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
-DEEPEST = 200
+MOST_DEPTH = 200
 #: Number of further joints that the matcher compares if several choices are equally good.
-AHEAD = 6
+LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: The score with more agreeing links and axes is better.
 #: If the numbers are equal, a score is better if its difference is less than this factor times the other's.
-TWICE_AS_WELL = 0.5
+BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
 _Choice = TypeVar("_Choice", float, FloatArray)
@@ -74,7 +74,7 @@ class LookAhead:
     Several matchers can share this number.
     """
 
-    left: int
+    remaining: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,35 +105,41 @@ class MechanismMatcher:
         self,
         a: Mechanism,
         b: Mechanism,
-        pairing: Pairing,
+        joint_matcher: JointMatcher,
         choices: AlignmentChoices | None,
-        ahead: LookAhead,
+        look_ahead: LookAhead,
         tolerance: Tolerance,
         base: tuple[int, int] | None,
     ) -> None:
-        self.a, self.b, self.pairing, self.choices, self.ahead = a, b, pairing, choices, ahead
+        self.a, self.b, self.joint_matcher, self.choices, self.look_ahead = (
+            a,
+            b,
+            joint_matcher,
+            choices,
+            look_ahead,
+        )
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
         self.subtree_sizes = _subtree_sizes(a), _subtree_sizes(b)
-        self.matched = 0
-        self.exact: Congruence | None = None
-        if choices is None and max(*a.depths, *b.depths) <= DEEPEST:
-            self.exact = Congruence(a, b, pairing, tolerance, self._poses_after)
+        self.match_count = 0
+        self.exact: SubtreeMatcher | None = None
+        if choices is None and max(*a.depths, *b.depths) <= MOST_DEPTH:
+            self.exact = SubtreeMatcher(a, b, joint_matcher, tolerance, self._poses_after)
 
     # -- first bodies ------------------------------------------------------------------------------
 
-    def best(self) -> Alignment:
+    def find_best(self) -> Alignment:
         best: Alignment | None = None
-        for bodies, X in self._starts():
-            found = self._match_from(bodies, X)
-            if best is None or better(found.score, best.score):
-                best, self.matched = found, found.matched
-            if not best.worst and not (best.only_a and best.only_b):
+        for bodies, X in self._start_candidates():
+            alignment = self._match_from(bodies, X)
+            if best is None or is_better(alignment.score, best.score):
+                best, self.match_count = alignment, alignment.match_count
+            if not best.max_difference and not (best.only_a and best.only_b):
                 break
         assert best is not None
         return best
 
-    def _starts(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
+    def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Yield the bodies of A and B from which the matcher may start.
 
         Each pair of bodies comes with a pose (4, 4) of B's root in A's root frame.
@@ -156,7 +162,7 @@ class MechanismMatcher:
             if start is not None:
                 yield start
         for base in bases:
-            if self._most_matches(base) < self.matched:
+            if self._most_matches(base) < self.match_count:
                 continue
             tried = list[FloatArray]()
             for X in chain(self._root_poses_by_names(base), self._root_poses_by_axes(base)):
@@ -177,17 +183,17 @@ class MechanismMatcher:
             for m, body, sizes in zip((self.a, self.b), base, self.subtree_sizes, strict=True):
                 own = [
                     sizes[edge.outer][k] if edge.inner == body else sizes[0][k] - sizes[edge.outer][k]
-                    for edge in m.edges_of[body]
+                    for edge in m.edges_by_body[body]
                 ]
                 branches.append(sorted(own, reverse=True))
             most += sum(map(min, *branches))
         return most
 
     def _exact_start(
-        self, exact: Congruence, bases: Sequence[tuple[int, int]]
+        self, exact: SubtreeMatcher, bases: Sequence[tuple[int, int]]
     ) -> tuple[tuple[int, int], FloatArray] | None:
         for base in bases:
-            if self.pairing.same_shape(base, (None, None)):
+            if self.joint_matcher.has_same_shape(base, (None, None)):
                 for X in self._exact_root_poses(base):
                     if exact.joint_pairs(base, (None, None), X) is not None:
                         return base, X
@@ -195,32 +201,34 @@ class MechanismMatcher:
 
     def _exact_root_poses(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         yield from self._root_poses_by_names(base)
-        siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
+        siblings = root_poses_by_siblings(
+            self.a, self.b, base, lambda e, f: self.joint_matcher.have_equal_subtrees(base, e, f)
+        )
         some = (
             X
             for X in chain(siblings, root_poses_by_axes(self.a, self.b, base))
-            if self.pairing.all_lie_alike(base, X)
+            if self.joint_matcher.all_axes_coincide(base, X)
         )
         yield from islice(some, MOST_ROOT_POSES)
 
     def _root_poses_by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         yield IDENTITY
-        for link_a, link_b in self.pairing.links(*base):
-            yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
+        for link_a, link_b in self.joint_matcher.links(*base):
+            yield self.a.zero_poses[link_a] @ inverse(self.b.zero_poses[link_b])
 
     def _start_bodies(self) -> Iterator[tuple[int, int]]:
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
             return
-        theirs = _most_shared(self.a, self.b)
-        if theirs is not None:
-            yield 0, theirs
+        body_b = _find_shared_body(self.a, self.b)
+        if body_b is not None:
+            yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
         # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
-        ours = _most_shared(self.b, self.a)
-        if ours is not None:
-            yield ours, 0
+        body_a = _find_shared_body(self.b, self.a)
+        if body_a is not None:
+            yield body_a, 0
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         scored = list[tuple[float, BodyPair, Score]]()
@@ -228,155 +236,188 @@ class MechanismMatcher:
             bodies = BodyPair(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, bodies, self._score(bodies)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
-        yield from (bodies.XC for _, bodies, score in scored if not better(best, score))
+        yield from (bodies.XC for _, bodies, score in scored if not is_better(best, score))
 
     # -- matching ------------------------------------------------------------------------------------
 
     def _match_from(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
+        alignment = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
-            place = stack.pop()
-            self._match_links(place, found)
-            pairs, only_a, only_b = self._joint_pairs(place)
-            found.only_a += _all_beyond(self.a, place.bodies[0], only_a)
-            found.only_b += _all_beyond(self.b, place.bodies[1], only_b)
+            body_pair = stack.pop()
+            self._match_links(body_pair, alignment)
+            pairs, only_a, only_b = self._joint_pairs(body_pair)
+            alignment.only_a += _joints_beyond(self.a, body_pair.bodies[0], only_a)
+            alignment.only_b += _joints_beyond(self.b, body_pair.bodies[1], only_b)
             for e, f in pairs:
-                step, there, _ = self._match_joints(place, e, f, len(found.steps), AHEAD)
-                stack.append(there)
-                found.steps.append(step)
+                step, next_pair, _ = self._match_joints(
+                    body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
+                )
+                stack.append(next_pair)
+                alignment.steps.append(step)
                 if step.differs:
-                    found.worst = max(found.worst, step.tilt * self.size + step.shift)
-                elif not step.unlike:
-                    found.matched += 1
-        return found
+                    alignment.max_difference = max(
+                        alignment.max_difference, step.tilt * self.size + step.shift
+                    )
+                elif not step.kind_difference:
+                    alignment.match_count += 1
+        return alignment
 
-    def _joint_pairs(self, place: BodyPair) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+    def _joint_pairs(self, body_pair: BodyPair) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         if self.exact is not None:
-            pairs = self.exact.joint_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
+            pairs = self.exact.joint_pairs(
+                body_pair.bodies, body_pair.via, inverse(body_pair.G) @ body_pair.XC
+            )
             if pairs is not None:
                 return pairs, (), ()
-        return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
+        return self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
 
-    def _poses_after(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
+    def _poses_after(self, beyond: tuple[int, int], via: EdgePair, X: FloatArray) -> Iterator[FloatArray]:
         """Yield possible poses of B's body after a joint, for the pose X of B's body before the joint."""
-        there = BodyPair(beyond, via, -1, IDENTITY, X)
-        kind, f = family(self.a.joint(via[0]).kind), via[1]
+        next_pair = BodyPair(beyond, via, -1, IDENTITY, X)
+        kind, f = motion_type(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
             t, turns = self.b.screw(f), kind == "turns"
-            for offset in self._offsets(there, IDENTITY, t, turns):
+            for offset in self._offsets(next_pair, IDENTITY, t, turns):
                 yield X @ screw_motion(t, offset, turns=turns) if offset else X
             return
-        homes = self.a.homes[via[0].joint + 1], self.b.homes[f.joint + 1]
-        plane = planar_counterpart(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
-        for N in self._motions_after(there, homes[0], homes[1], plane, self._exact_root_poses(beyond)):
-            yield homes[0] @ N @ inverse(homes[1])
+        zero_poses = self.a.zero_poses[via[0].joint + 1], self.b.zero_poses[f.joint + 1]
+        plane = planar_counterpart(inverse(X @ zero_poses[1]) @ zero_poses[0]) if kind == "planar" else None
+        for N in self._motions_after(
+            next_pair, zero_poses[0], zero_poses[1], plane, self._exact_root_poses(beyond)
+        ):
+            yield zero_poses[0] @ N @ inverse(zero_poses[1])
 
-    def _match_links(self, place: BodyPair, found: Alignment) -> None:
-        pairs = self._all_links(place)
-        if (other := self._pair_of_tools(place, pairs)) is not None:
-            found.frames.append(other)
+    def _match_links(self, body_pair: BodyPair, alignment: Alignment) -> None:
+        pairs = self._all_links(body_pair)
+        if (other := self._pair_of_tools(body_pair, pairs)) is not None:
+            alignment.frames.append(other)
         for link_a, link_b in pairs:
-            home = self.a.homes[link_a]
-            at, seen = place.G @ home, place.XC @ self.b.homes[link_b]
-            angle, distance = pose_difference(at, seen)
+            zero_pose = self.a.zero_poses[link_a]
+            pose_a, pose_b = body_pair.G @ zero_pose, body_pair.XC @ self.b.zero_poses[link_b]
+            angle, distance = pose_difference(pose_a, pose_b)
             end = IDENTITY
             if self.tolerance.holds(angle, distance):
                 angle = distance = 0.0
-                found.matched += 1
+                alignment.match_count += 1
             else:
-                end = inverse(place.G) @ seen @ inverse(home)
-                found.worst = max(found.worst, angle * self.size + distance)
-            found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
+                end = inverse(body_pair.G) @ pose_b @ inverse(zero_pose)
+                alignment.max_difference = max(alignment.max_difference, angle * self.size + distance)
+            alignment.frames.append(
+                FramePair(link_a, link_b, body_pair.previous, zero_pose, end, angle, distance)
+            )
 
-    def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
+    def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Return two links of matched bodies as a pair of different end-effector frames.
 
         The result is None if a link of one body already matches a link of the other body. The result is also
         None if every link name of one body occurs in the other model.
         """
-        ours, theirs = self._own_links(place)
-        if matched or not ours or not theirs:
+        links_a, links_b = self._own_links(body_pair)
+        if matched or not links_a or not links_b:
             return None
-        home = self.a.homes[ours[0]]
-        tool = inverse(place.G @ home) @ place.XC @ self.b.homes[theirs[0]]
-        return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
+        zero_pose = self.a.zero_poses[links_a[0]]
+        tool = inverse(body_pair.G @ zero_pose) @ body_pair.XC @ self.b.zero_poses[links_b[0]]
+        return FramePair(links_a[0], links_b[0], body_pair.previous, zero_pose, IDENTITY, 0.0, 0.0, tool)
 
-    def _all_links(self, place: BodyPair) -> list[tuple[int, int]]:
-        pairs = list(self.pairing.links(*place.bodies))
+    def _all_links(self, body_pair: BodyPair) -> list[tuple[int, int]]:
+        pairs = list(self.joint_matcher.links(*body_pair.bodies))
         taken = {j for _, j in pairs}
-        ours, theirs = self._own_links(place)
-        for i in ours:
-            at = place.G @ self.a.homes[i]
-            for j in theirs:
-                if j not in taken and self.tolerance.holds(*pose_difference(at, place.XC @ self.b.homes[j])):
+        links_a, links_b = self._own_links(body_pair)
+        for i in links_a:
+            pose_a = body_pair.G @ self.a.zero_poses[i]
+            for j in links_b:
+                if j not in taken and self.tolerance.holds(
+                    *pose_difference(pose_a, body_pair.XC @ self.b.zero_poses[j])
+                ):
                     pairs.append((i, j))
                     taken.add(j)
                     break
         return pairs
 
-    def _own_links(self, place: BodyPair) -> tuple[list[int], list[int]]:
+    def _own_links(self, body_pair: BodyPair) -> tuple[list[int], list[int]]:
         names_a, names_b = self.a.labels, self.b.labels
-        ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
-        return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
+        links_a = [i for i in self.a.bodies[body_pair.bodies[0]] if names_a[i] not in names_b]
+        return links_a, [j for j in self.b.bodies[body_pair.bodies[1]] if names_b[j] not in names_a]
 
     def _match_joints(
-        self, place: BodyPair, e: Edge, f: Edge, index: int, depth: int
+        self, body_pair: BodyPair, e: Edge, f: Edge, index: int, depth: int
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
+        kinds = motion_type(self.a.joint(e).kind), motion_type(self.b.joint(f).kind)
         via = e, f
-        backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
-        bodies = e.other_body(place.bodies[0]), f.other_body(place.bodies[1])
-        there = BodyPair(bodies, via, index, place.G, place.XC)
+        backwards = e.outer == body_pair.bodies[0], f.outer == body_pair.bodies[1]
+        bodies = e.other_body(body_pair.bodies[0]), f.other_body(body_pair.bodies[1])
+        next_pair = BodyPair(bodies, via, index, body_pair.G, body_pair.XC)
         if kinds[0] != kinds[1]:
-            return self._match_unlike(place, via, kinds, backwards), there, (0, 0.0)
+            return self._match_unlike(body_pair, via, kinds, backwards), next_pair, (0, 0.0)
         if kinds[0] in ("turns", "prismatic"):
-            return self._match_axes(place, there, backwards, depth, turns=kinds[0] == "turns")
-        return self._match_free_joints(place, there, backwards, depth, kinds[0])
+            return self._match_axes(body_pair, next_pair, backwards, depth, turns=kinds[0] == "turns")
+        return self._match_free_joints(body_pair, next_pair, backwards, depth, kinds[0])
 
     def _match_unlike(
-        self, place: BodyPair, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
+        self,
+        body_pair: BodyPair,
+        via: tuple[Edge, Edge],
+        kinds: tuple[str, str],
+        backwards: tuple[bool, bool],
     ) -> MatchedJoints:
-        unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
-        if unlike == "a":
-            axis = _outwards(self.b.screw(via[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
+        kind_difference = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
+        if kind_difference == "a":
+            axis = _outwards(self.b.screw(via[1]), backwards[1]).transform(
+                inverse(body_pair.G) @ body_pair.XC
+            )
         else:
             axis = _outwards(self.a.screw(via[0]), backwards[0])
-        kind = kinds[1] if unlike == "a" else kinds[0]
+        kind = kinds[1] if kind_difference == "a" else kinds[0]
         return MatchedJoints(
-            via[0].joint, via[1].joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0, unlike
+            via[0].joint,
+            via[1].joint,
+            kind,
+            body_pair.previous,
+            1,
+            0.0,
+            IDENTITY,
+            axis,
+            axis,
+            0.0,
+            0.0,
+            kind_difference,
         )
 
     def _match_free_joints(
-        self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, kind: str
+        self, body_pair: BodyPair, next_pair: BodyPair, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        e, f = _both(there.via)
-        homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
-        at, seen = place.G @ homes[0], place.XC @ homes[1]
-        axis, back = Screw(homes[0][:3, 2], homes[0][:3, 3]), backwards[0] != backwards[1]
-        step = MatchedJoints(e.joint, f.joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0)
-        given = None if self.choices is None else self.choices.conversions.get(self.a.joint(e).name)
-        as_written = self.choices is not None and given is None
+        e, f = _require_edges(next_pair.via)
+        zero_poses = self.a.zero_poses[e.joint + 1], self.b.zero_poses[f.joint + 1]
+        pose_a, pose_b = body_pair.G @ zero_poses[0], body_pair.XC @ zero_poses[1]
+        axis, back = Screw(zero_poses[0][:3, 2], zero_poses[0][:3, 3]), backwards[0] != backwards[1]
+        step = MatchedJoints(
+            e.joint, f.joint, kind, body_pair.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0
+        )
+        prescribed = None if self.choices is None else self.choices.conversions.get(self.a.joint(e).name)
+        as_written = self.choices is not None and prescribed is None
         if as_written:
-            K, tilt, shift = seen @ inverse(at), *pose_difference(at, seen)
+            K, tilt, shift = pose_b @ inverse(pose_a), *pose_difference(pose_a, pose_b)
         else:
-            K, tilt, shift = _normals_apart(at, seen) if kind == "planar" else (IDENTITY, 0.0, 0.0)
+            K, tilt, shift = _align_normals(pose_a, pose_b) if kind == "planar" else (IDENTITY, 0.0, 0.0)
         if not self.tolerance.holds(tilt, shift):
-            step = replace(step, before=inverse(place.G) @ K @ place.G, tilt=tilt, shift=shift)
-            there, at = replace(there, G=K @ place.G), K @ at
+            step = replace(step, before=inverse(body_pair.G) @ K @ body_pair.G, tilt=tilt, shift=shift)
+            next_pair, pose_a = replace(next_pair, G=K @ body_pair.G), K @ pose_a
         if as_written:
-            return replace(step, unlike="kind" if back else ""), there, (0, 0.0)
-        M = inverse(seen) @ at
-        exact = self._exact_pose(place, there)
-        if given is not None:
-            tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
+            return replace(step, kind_difference="kind" if back else ""), next_pair, (0, 0.0)
+        M = inverse(pose_b) @ pose_a
+        exact = self._exact_pose(body_pair, next_pair)
+        if prescribed is not None:
+            tried: Iterable[FloatArray] = [inverse(prescribed.before) if backwards[1] else prescribed.behind]
         elif exact is not None:
-            tried = [inverse(at) @ exact @ homes[1]]
+            tried = [inverse(pose_a) @ exact @ zero_poses[1]]
         else:
             plane = planar_counterpart(M) if kind == "planar" else None
-            tried = self._motions_after(there, at, homes[1], plane, self._root_poses_by_axes(there.bodies))
-        places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
-        N, moved, score = self._best(places, depth)
+            tried = self._motions_after(
+                next_pair, pose_a, zero_poses[1], plane, self._root_poses_by_axes(next_pair.bodies)
+            )
+        body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
+        N, moved, score = self._best(body_pairs, depth)
         # Let P_a and P_b be the joint's poses in A and B, so P_b = M P_a N.
         # If the path leads from the joint's child to its parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
@@ -384,85 +425,94 @@ class MechanismMatcher:
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
         )
         if before is IDENTITY and behind is IDENTITY and not back:
-            return step, there, score
+            return step, next_pair, score
         return replace(step, conversion=JointTransform(before, behind, back)), moved, score
 
     def _motions_after(
         self,
-        there: BodyPair,
-        at: FloatArray,
-        home_b: FloatArray,
+        next_pair: BodyPair,
+        pose_a: FloatArray,
+        zero_pose_b: FloatArray,
         plane: FloatArray | None,
         poses_after: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        `at` (4, 4) is the frame of A's joint after the motion G. `home_b` (4, 4) is the frame of B's joint in
-        B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane` (4, 4) is
-        one possible motion N, and every possible N is the product of `plane` and a planar pose.
+        `pose_a` (4, 4) is the frame of A's joint after the motion G. `zero_pose_b` (4, 4) is the frame of B's
+        joint in B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane`
+        (4, 4) is one possible motion N, and every possible N is the product of `plane` and a planar pose.
         """
         yield IDENTITY if plane is None else plane
-        wanted = [there.XC]
-        wanted += [
-            there.G @ self.a.homes[i] @ inverse(self.b.homes[j]) for i, j in self.pairing.links(*there.bodies)
+        candidates = [next_pair.XC]
+        candidates += [
+            next_pair.G @ self.a.zero_poses[i] @ inverse(self.b.zero_poses[j])
+            for i, j in self.joint_matcher.links(*next_pair.bodies)
         ]
-        for XC in chain(wanted, (there.G @ X for X in poses_after)):
-            N = inverse(at) @ XC @ home_b
+        for XC in chain(candidates, (next_pair.G @ X for X in poses_after)):
+            N = inverse(pose_a) @ XC @ zero_pose_b
             yield N if plane is None else plane @ nearest_planar_pose(inverse(plane) @ N)
 
     def _match_axes(
-        self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, *, turns: bool
+        self,
+        body_pair: BodyPair,
+        next_pair: BodyPair,
+        backwards: tuple[bool, bool],
+        depth: int,
+        *,
+        turns: bool,
     ) -> tuple[MatchedJoints, BodyPair, Score]:
         """Match two revolute or prismatic joints, and choose the sign and zero offset."""
-        e, f = _both(there.via)
+        e, f = _require_edges(next_pair.via)
         s = _outwards(self.a.screw(e), backwards[0])
         t = _outwards(self.b.screw(f), backwards[1])
-        start, end = s.moved(place.G), t.moved(place.XC)
-        sense, zero = self._prescribed(self.a.joint(e).name)
+        start, end = s.transform(body_pair.G), t.transform(body_pair.XC)
+        sense, zero = self._zero_choice(self.a.joint(e).name)
         sense = sense or (-1 if start.direction @ end.direction < 0.0 else 1)
         if sense < 0:
-            end = end.reversed()
+            end = end.reverse()
         K, tilt, shift = smallest_motion(start, end, turns=turns)
         kind = "turns" if turns else "prismatic"
-        step = MatchedJoints(e.joint, f.joint, kind, place.previous, sense, 0.0, IDENTITY, s, s, 0.0, 0.0)
+        step = MatchedJoints(e.joint, f.joint, kind, body_pair.previous, sense, 0.0, IDENTITY, s, s, 0.0, 0.0)
         if self.tolerance.holds(tilt, shift):
-            exact = self._exact_pose(place, there)
+            exact = self._exact_pose(body_pair, next_pair)
             if exact is not None:
-                T = inverse(place.XC) @ exact
+                T = inverse(body_pair.XC) @ exact
                 zero = angle_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
-                zero = 0.0 if self.tolerance.holds(*pose_difference(place.XC, exact)) else zero
-            offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
-            return replace(step, offset=offset), there, score
+                zero = 0.0 if self.tolerance.holds(*pose_difference(body_pair.XC, exact)) else zero
+            offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
+            return replace(step, offset=offset), next_pair, score
         # In B, either the axis and all later bodies are moved by K, or only the axis is moved.
-        step, back = replace(step, tilt=tilt, shift=shift), inverse(place.G)
-        with_bodies = self._best_zero(there, K @ place.G, t, turns, zero, depth)
-        if depth == AHEAD:
-            alone = self._best_zero(there, place.G, t, turns, zero, depth)
-            if better(self._score(alone[1]), self._score(with_bodies[1])):
-                return replace(step, offset=alone[0], other=end.moved(back)), *alone[1:]
-        return replace(step, offset=with_bodies[0], before=back @ K @ place.G), *with_bodies[1:]
+        step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
+        with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
+        if depth == LOOK_AHEAD_DEPTH:
+            alone = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
+            if is_better(self._score(alone[1]), self._score(with_bodies[1])):
+                return replace(step, offset=alone[0], axis_b=end.transform(back)), *alone[1:]
+        return replace(step, offset=with_bodies[0], before=back @ K @ body_pair.G), *with_bodies[1:]
 
-    def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
+    def _exact_pose(self, body_pair: BodyPair, next_pair: BodyPair) -> FloatArray | None:
         if self.exact is None:
             return None
-        X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
-        return None if X is None else place.G @ X
+        X = self.exact.pose_after(
+            *_require_edges(next_pair.via), body_pair.bodies, inverse(body_pair.G) @ body_pair.XC
+        )
+        return None if X is None else body_pair.G @ X
 
     # -- zero offsets ------------------------------------------------------------------------------
 
-    def _prescribed(self, joint: str) -> tuple[int, float | None]:
+    def _zero_choice(self, joint: str) -> tuple[int, float | None]:
         """Return a joint's prescribed sign and zero offset; (0, None) without `choices`."""
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
-        self, there: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
+        self, next_pair: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, BodyPair, Score]:
-        offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
+        offsets = self._offsets(next_pair, G, t, turns) if zero is None else (zero,)
         moved = (
-            (offset, there.XC @ screw_motion(t, offset, turns=turns) if offset else there.XC)
+            (offset, next_pair.XC @ screw_motion(t, offset, turns=turns) if offset else next_pair.XC)
             for offset in offsets
         )
-        return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
+        return self._best(((offset, replace(next_pair, G=G, XC=XC)) for offset, XC in moved), depth)
 
     def _best(
         self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
@@ -473,38 +523,38 @@ class MechanismMatcher:
         that intersect at right angles allow two poses of B, so a third axis must decide.
         """
         scored = list[tuple[_Choice, BodyPair, Score]]()
-        for choice, place in choices:
-            if any(self.tolerance.holds(*pose_difference(known.XC, place.XC)) for _, known, _ in scored):
+        for choice, body_pair in choices:
+            if any(self.tolerance.holds(*pose_difference(known.XC, body_pair.XC)) for _, known, _ in scored):
                 continue
-            score = self._score(place)
-            scored.append((choice, place, score))
+            score = self._score(body_pair)
+            scored.append((choice, body_pair, score))
             # If all axes and links agree, no other choice can agree better.
-            if not score[1] and self.pairing.links(*place.bodies):
+            if not score[1] and self.joint_matcher.links(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
-        equal = [one for one in scored if not better(best[2], one[2])]
-        if not depth or self.ahead.left <= 0 or (len(equal) == 1 and depth == AHEAD):
+        equal = [one for one in scored if not is_better(best[2], one[2])]
+        if not depth or self.look_ahead.remaining <= 0 or (len(equal) == 1 and depth == LOOK_AHEAD_DEPTH):
             return best
         scored_ahead = list[tuple[_Choice, BodyPair, Score]]()
-        for choice, place, score in equal:
-            scored_ahead.append((choice, place, self._score_ahead(place, score, depth)))
+        for choice, body_pair, score in equal:
+            scored_ahead.append((choice, body_pair, self._score_ahead(body_pair, score, depth)))
             if not scored_ahead[-1][2][1]:
                 break
         return _best_of(scored_ahead)
 
-    def _score_ahead(self, place: BodyPair, own: Score, depth: int) -> Score:
-        pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
-        self.ahead.left -= len(pairs)
-        scores = [own, *(self._match_joints(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
+    def _score_ahead(self, body_pair: BodyPair, own: Score, depth: int) -> Score:
+        pairs = self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)[0]
+        self.look_ahead.remaining -= len(pairs)
+        scores = [own, *(self._match_joints(body_pair, e, f, -1, depth - 1)[2] for e, f in pairs)]
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
-    def _score(self, place: BodyPair) -> Score:
+    def _score(self, body_pair: BodyPair) -> Score:
         differences = [
-            pose_difference(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
-            for i, j in self.pairing.links(*place.bodies)
+            pose_difference(body_pair.G @ self.a.zero_poses[i], body_pair.XC @ self.b.zero_poses[j])
+            for i, j in self.joint_matcher.links(*body_pair.bodies)
         ]
-        pairs, _, _ = self.pairing.edges(place.bodies, place.via, place.G, place.XC)
-        differences += [self.pairing.mismatch(e, f, place.G, place.XC) for e, f in pairs]
+        pairs, _, _ = self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
+        differences += [self.joint_matcher.mismatch(e, f, body_pair.G, body_pair.XC) for e, f in pairs]
         wrong = [
             angle * self.size + shift
             for angle, shift in differences
@@ -512,17 +562,19 @@ class MechanismMatcher:
         ]
         return len(differences) - len(wrong), max(wrong, default=0.0)
 
-    def _offsets(self, there: BodyPair, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
+    def _offsets(self, next_pair: BodyPair, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
         yield 0.0
-        u = t.moved(there.XC)
-        for i, j in self.pairing.links(*there.bodies):
-            at, seen = G @ self.a.homes[i], there.XC @ self.b.homes[j]
+        u = t.transform(next_pair.XC)
+        for i, j in self.joint_matcher.links(*next_pair.bodies):
+            pose_a, pose_b = G @ self.a.zero_poses[i], next_pair.XC @ self.b.zero_poses[j]
             if turns:
-                yield angle_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
+                yield angle_about(u.direction, pose_a[:3, :3] @ pose_b[:3, :3].T)
             else:
-                yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
-        for ours, theirs in later_axes((self.a, self.b), there.via, there.bodies, (u.moved(inverse(G)), t)):
-            yield from zero_candidates(u, ours.moved(G), theirs.moved(there.XC), turns)
+                yield float(u.direction @ (pose_a[:3, 3] - pose_b[:3, 3]))
+        for axis_a, axis_b in later_axes(
+            (self.a, self.b), next_pair.via, next_pair.bodies, (u.transform(inverse(G)), t)
+        ):
+            yield from zero_candidates(u, axis_a.transform(G), axis_b.transform(next_pair.XC), turns)
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
@@ -534,7 +586,7 @@ def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
     return sizes
 
 
-def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
+def _find_shared_body(one: Mechanism, other: Mechanism) -> int | None:
     names = {one.labels[link] for link in one.bodies[0]}
     shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
@@ -543,45 +595,45 @@ def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
 def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice, BodyPair, Score]:
     best = scored[0]
     for one in scored[1:]:
-        best = one if better(one[2], best[2]) else best
+        best = one if is_better(one[2], best[2]) else best
     return best
 
 
-def better(score: Score, than: Score) -> bool:
-    return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
+def is_better(score: Score, than: Score) -> bool:
+    return score[0] > than[0] or (score[0] == than[0] and score[1] < BETTER_RATIO * than[1])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
     """Return a joint's screw, reversed if the matcher crosses the joint from the child to the parent."""
-    return screw.reversed() if backwards else screw
+    return screw.reverse() if backwards else screw
 
 
-def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
+def _require_edges(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
     e, f = via
     assert e is not None
     assert f is not None
     return e, f
 
 
-def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    found, stack = [], [(body, edge) for edge in edges]
+def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
+    joints, stack = [], [(body, edge) for edge in edges]
     while stack:
-        here, edge = stack.pop()
-        found.append(edge.joint)
-        beyond = edge.other_body(here)
-        stack += [(beyond, other) for other in mechanism.edges_of[beyond] if other is not edge]
-    return found
+        current, edge = stack.pop()
+        joints.append(edge.joint)
+        beyond = edge.other_body(current)
+        stack += [(beyond, other) for other in mechanism.edges_by_body[beyond] if other is not edge]
+    return joints
 
 
-def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
+def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
     """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad), and 0.0.
 
     The angle does not depend on the signs of the normals or the distance between the planes. The last value
     is the shift (m), which is always 0 for planes.
     """
-    start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
+    start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
-        start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False
+        start, end.reverse() if start.direction @ end.direction < 0.0 else end, turns=False
     )
 
 
@@ -589,7 +641,7 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 MOST_ORDERS = 120
 #: After this number of joint pairs, a search no longer compares joints beyond the current joint.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
-MOST_AHEAD = 2000
+MOST_LOOK_AHEAD = 2000
 #: Larger angle tolerances (rad) that are tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 #: Maximum number of attempts to exchange the partners of two joint pairs.
@@ -597,31 +649,31 @@ MOST_EXCHANGED = 12
 
 
 def align(
-    a: Mechanism, b: Mechanism, given: Mapping[str, str], choices: AlignmentChoices | None = None
+    a: Mechanism, b: Mechanism, name_map: Mapping[str, str], choices: AlignmentChoices | None = None
 ) -> Alignment:
-    """Align B with A; `given` maps joint names of A to joint names of B."""
+    """Align B with A; `name_map` maps joint names of A to joint names of B."""
     if choices is not None:
-        for taken in choices.orders:
-            b = b.reordered(taken)
-        return _best_alignment(a, b, given, choices)
-    best = _best_alignment(a, b, given, None, LookAhead(MOST_AHEAD))
+        for order in choices.orders:
+            b = b.reorder(order)
+        return _best_alignment(a, b, name_map, choices)
+    best = _best_alignment(a, b, name_map, None, LookAhead(MOST_LOOK_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
-        if best.complete:
+        if best.is_complete:
             break
         present, run = best.b, next(orders)
-        for names in _orders_to_try(a, present, given, run, orders):
+        for names in _orders_to_try(a, present, name_map, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
-            other = present.reordered(names[moved[0] : moved[-1] + 1])
-            found = _best_alignment(a, other, given, None)
-            if better(found.score, best.score):
-                best = found
-    return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, given), given))
+            other = present.reorder(names[moved[0] : moved[-1] + 1])
+            candidate = _best_alignment(a, other, name_map, None)
+            if is_better(candidate.score, best.score):
+                best = candidate
+    return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map))
 
 
 def _orders_to_try(
-    a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
+    a: Mechanism, b: Mechanism, name_map: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
+    called = {name_map.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
         yield from islice(orders, MOST_ORDERS)
         return
@@ -638,70 +690,79 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
     if not zeros:
         return best
     choices = best.choices
-    found = _best_alignment(best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros}))
-    return found if found.differing <= best.differing and found.worst <= best.worst else best
+    candidate = _best_alignment(
+        best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros})
+    )
+    return (
+        candidate
+        if candidate.difference_count <= best.difference_count
+        and candidate.max_difference <= best.max_difference
+        else best
+    )
 
 
-def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
+def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
     # A joint that only one model has is a difference, whichever pairs are exchanged.
     if best.only_a or best.only_b:
         return best
-    tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
-    while (pairs := next((one for one in best.exchangeable(given) if one not in tried), None)) is not None:
+    tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)
+    while (pairs := next((one for one in best.exchangeable(name_map) if one not in tried), None)) is not None:
         tried.add(pairs)
         if len(tried) > MOST_EXCHANGED:
             break
         joints = best.a.tree.joints, best.b.tree.joints
         (a, b), (c, d) = pairs
         other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
-        found = _best_alignment(best.a, best.b, {**given, **other}, None, ahead, base=best.base)
-        if better(found.score, best.score):
-            best, given = found, {**given, **other}
+        candidate = _best_alignment(best.a, best.b, {**name_map, **other}, None, look_ahead, base=best.base)
+        if is_better(candidate.score, best.score):
+            best, name_map = candidate, {**name_map, **other}
     return best
 
 
-def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
+def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
 
     If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
     This function repeats the search with larger tolerances. The new choices are then used with the normal
     tolerance, so that the result contains the small differences.
     """
-    a, b, (least, most), ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_AHEAD)
+    a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
     for angle in LARGER_TOLERANCES:
-        if not least < angle * size < TWICE_AS_WELL * most:
+        if not least < angle * size < BETTER_RATIO * most:
             continue
         tolerance = Tolerance(angle, angle * size)
-        rough = _best_alignment(a, b, given, None, ahead, tolerance, best.base)
+        rough = _best_alignment(a, b, name_map, None, look_ahead, tolerance, best.base)
         unmatched = [(len(one.only_a), len(one.only_b)) for one in (rough, best)]
         if rough.inner_differences[1] or unmatched[0] != unmatched[1]:
             continue
         exact = _best_alignment(a, b, rough.names, rough.choices)
-        return exact if exact.inner_differences[1] < TWICE_AS_WELL * most else best
+        return exact if exact.inner_differences[1] < BETTER_RATIO * most else best
     return best
 
 
 def _best_alignment(
     a: Mechanism,
     b: Mechanism,
-    given: Mapping[str, str],
+    name_map: Mapping[str, str],
     choices: AlignmentChoices | None,
-    ahead: LookAhead | None = None,
+    look_ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
-    pairing = Pairing(a, b, given, tolerance)
-    return MechanismMatcher(a, b, pairing, choices, ahead or LookAhead(0), tolerance, base).best()
+    joint_matcher = JointMatcher(a, b, name_map, tolerance)
+    return MechanismMatcher(
+        a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base
+    ).find_best()
 
 
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
-TURNS = (0, 1, -1)
+FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
 #: The factor is large, because two axes close to each other determine a zero offset inexactly.
-LEVER = 1e4
+OFFSET_FACTOR = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -715,7 +776,7 @@ class _Rule:
         slope: The product s m.
         constant: The product s c.
         free: Whether o can have any value, because no link and no axis after the joint determines o.
-        meets: Whether the joint moves a pair of matched links, or the axis of a later joint.
+        has_effect: Whether the joint moves a pair of matched links, or the axis of a later joint.
     """
 
     step: int
@@ -726,13 +787,13 @@ class _Rule:
     offset: float
     turns: bool
     free: bool
-    meets: bool
+    has_effect: bool
 
-    def beta(self, turn: int) -> float:
+    def beta_for(self, turn: int) -> float:
         """Return beta in y = alpha x + beta if `turn` full turns are added to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
-    def wanted(self, beta: float) -> float:
+    def offset_for(self, beta: float) -> float:
         """Return the offset o of the joint's zero for which y = alpha x + beta holds."""
         return self.n * beta + self.d - self.constant
 
@@ -740,7 +801,7 @@ class _Rule:
         difference = offset - self.offset
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
-        return self.free or abs(difference) <= LEVER * tolerance.angle * max(1.0, abs(offset))
+        return self.free or abs(difference) <= OFFSET_FACTOR * tolerance.angle * max(1.0, abs(offset))
 
 
 def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
@@ -754,17 +815,17 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
         fit = [rule for rule in rules if _near(rule.slope, rule.n * alpha, tolerance)]
-        some = sorted((rule for rule in fit if rule.n), key=lambda rule: (rule.free, not rule.meets))
+        some = sorted((rule for rule in fit if rule.n), key=lambda rule: (rule.free, not rule.has_effect))
         some = [rule for rule in some if rule.free == some[0].free]
-        betas = [rule.beta(turn) for rule in some for turn in (TURNS if rule.turns else (0,))]
+        betas = [rule.beta_for(turn) for rule in some for turn in (FULL_TURNS if rule.turns else (0,))]
         if not betas:
             continue
-        beta = max(betas, key=lambda one: sum(rule.allows(rule.wanted(one), tolerance) for rule in fit))
+        beta = max(betas, key=lambda one: sum(rule.allows(rule.offset_for(one), tolerance) for rule in fit))
         for rule in fit:
-            wanted = rule.wanted(beta)
-            if rule.allows(wanted, tolerance) and not _near(wanted, rule.offset, tolerance):
+            offset = rule.offset_for(beta)
+            if rule.allows(offset, tolerance) and not _near(offset, rule.offset, tolerance):
                 step = alignment.steps[rule.step]
-                zeros[alignment.a.tree.joints[step.a].name] = step.sense, wanted
+                zeros[alignment.a.tree.joints[step.a].name] = step.sense, offset
     return zeros
 
 
@@ -775,13 +836,13 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(alignment.steps):
-        if step.unlike or step.kind not in ("turns", "prismatic"):
+        if step.kind_difference or step.kind not in ("turns", "prismatic"):
             continue
         x, m, c = _as_rule(alignment.a.tree.joints[step.a])
         y, n, d = _as_rule(alignment.b.tree.joints[step.b])
         slope, constant = step.sense * m, step.sense * c
-        determined, meets = _is_determined(alignment, i)
-        rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, meets)
+        determined, has_effect = _is_determined(alignment, i)
+        rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, has_effect)
         groups.setdefault((x, y), []).append(rule)
     yield from (rules for rules in groups.values() if len(rules) > 1)
 
@@ -794,13 +855,18 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether later axes or links determine the zero offset of joint pair i.
 
-    The second result is the value of `_Rule.meets`.
+    The second result is the value of `_Rule.has_effect`.
     """
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):
         if step.previous in behind:
-            if step.differs or step.unlike or step.conversion or not _keeps_axis(alignment.steps[i], step):
+            if (
+                step.differs
+                or step.kind_difference
+                or step.conversion
+                or not _keeps_axis(alignment.steps[i], step)
+            ):
                 return True, True
             behind.add(k)
     carried = [frame for frame in alignment.frames if frame.previous in behind]
@@ -814,5 +880,5 @@ def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:
         return False
-    placed = one.kind == other.kind == "turns"
-    return max(between_lines(one.axis, other.axis, placed=placed)) == 0.0
+    with_distance = one.kind == other.kind == "turns"
+    return max(line_difference(one.axis_a, other.axis_a, with_distance=with_distance)) == 0.0

@@ -51,18 +51,18 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from urdfkin.kinematics.rotation import (
-    axis_aligning,
     exp_rotation,
     quaternion_of,
     rotation_about,
-    rotation_of,
+    rotation_from_quaternion,
+    rotation_with_z_axis,
 )
-from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
-from urdfkin.model.chain import LEAST_SIZE
+from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ROUNDINGS
+from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
 #: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
-ALONG = 1e-12
+PARALLEL_TOLERANCE = 1e-12
 
 
 def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
@@ -93,7 +93,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
     if sine == 0.0:  # for opposite vectors, any perpendicular axis is correct
-        axis = np.zeros(3) if cosine > 0.0 else axis_aligning(u)[:, 0] * math.pi
+        axis = np.zeros(3) if cosine > 0.0 else rotation_with_z_axis(u)[:, 0] * math.pi
         return exp_rotation(axis), angle
     return exp_rotation(cross * (angle / sine)), angle
 
@@ -115,7 +115,7 @@ def angle_about(u: FloatArray, R: FloatArray) -> float:
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
     """Return the angle (rad) about u from x to y; None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
-    if min(np.linalg.norm(x), np.linalg.norm(y)) < ALONG:
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < PARALLEL_TOLERANCE:
         return None
     return math.atan2(float(u @ np.cross(x, y)), float(x @ y))
 
@@ -123,7 +123,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 #: Relative tolerance for the entries of a computed pose.
 _POSE_TOLERANCE = 1e-9
 #: Test coordinates (m, m, rad) of a planar joint; none of them is 0.
-_AWAY = np.array([1.0, 2.0, 3.0])
+_TEST_COORDINATES = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -140,29 +140,29 @@ class JointTransform:
     behind: FloatArray
     back: bool = False
 
-    def __call__(self, kind: JointKind, own: FloatArray) -> FloatArray:
+    def __call__(self, kind: JointKind, coordinates: FloatArray) -> FloatArray:
         """Convert coordinates (..., 3 or 7) of A's joint to coordinates of B's joint."""
-        P = pose_of(kind, own)
+        P = pose_of(kind, coordinates)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
         """Return whether M and N are rigid motions, and the joint can reach M P N for two test poses P."""
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
-        away = pose_of(JointKind.PLANAR, _AWAY)
+        away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
         return all(is_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
 
 
-def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
+def pose_of(kind: JointKind, coordinates: FloatArray) -> FloatArray:
     """Return P (..., 4, 4) for a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
-    P = np.zeros((*own.shape[:-1], 4, 4))
+    P = np.zeros((*coordinates.shape[:-1], 4, 4))
     P[..., 3, 3] = 1.0
     if kind is JointKind.PLANAR:
-        P[..., :2, 3], P[..., :3, :3] = own[..., :2], rotation_about(_Z, own[..., 2])
+        P[..., :2, 3], P[..., :3, :3] = coordinates[..., :2], rotation_about(_Z, coordinates[..., 2])
     elif kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the pose of a {kind} joint")
     else:
-        P[..., :3, 3], P[..., :3, :3] = own[..., :3], rotation_of(own[..., 3:])
+        P[..., :3, 3], P[..., :3, :3] = coordinates[..., :3], rotation_from_quaternion(coordinates[..., 3:])
     return P
 
 
@@ -208,10 +208,10 @@ class Screw:
     direction: FloatArray
     point: FloatArray
 
-    def moved(self, T: FloatArray) -> Screw:
+    def transform(self, T: FloatArray) -> Screw:
         return Screw(T[:3, :3] @ self.direction, T[:3, :3] @ self.point + T[:3, 3])
 
-    def reversed(self) -> Screw:
+    def reverse(self) -> Screw:
         return Screw(-self.direction, self.point)
 
 
@@ -232,30 +232,33 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating: Indices of joints that are fixed in this model and move in the other model.
+        separating_joints: Indices of joints that are fixed in this model and move in the other model.
         labels: A label for each link, by default the link's name. Links with equal labels are paired.
 
     Attributes:
-        homes: (4, 4) pose of each link in the root frame, in the zero configuration.
-        orders: Each entry lists consecutive joints whose order `reordered` changed, in their new order.
+        zero_poses: (4, 4) pose of each link in the root frame, in the zero configuration.
+        orders: Each entry lists consecutive joints whose order `reorder` changed, in their new order.
         lengths: Length (m) of the path from the root to each link.
     """
 
     def __init__(
-        self, tree: KinematicTree, separating: Collection[int] = (), labels: Sequence[str] | None = None
+        self,
+        tree: KinematicTree,
+        separating_joints: Collection[int] = (),
+        labels: Sequence[str] | None = None,
     ) -> None:
         self.tree = tree
         self.labels = tree.links if labels is None else tuple(labels)
-        self.homes, self.body_of, self.bodies, self.edges = [np.eye(4)], [0], [[0]], list[Edge]()
+        self.zero_poses, self.body_of, self.bodies, self.edges = [np.eye(4)], [0], [[0]], list[Edge]()
         self.lengths, self.depths = [0.0], [0]
         self.orders: tuple[tuple[str, ...], ...] = ()
         self._screws: dict[int, Screw] = {}
         for i, joint in enumerate(tree.joints):
-            self.homes.append(self.homes[joint.parent] @ joint.T_parent_joint)
+            self.zero_poses.append(self.zero_poses[joint.parent] @ joint.T_parent_joint)
             self.lengths.append(self.lengths[joint.parent] + joint.length)
             self.depths.append(self.depths[joint.parent] + 1)
             body = self.body_of[joint.parent]
-            if joint.kind.nv or i in separating:
+            if joint.kind.nv or i in separating_joints:
                 self.edges.append(Edge(i, body, len(self.bodies)))
                 body = len(self.bodies)
                 self.bodies.append([])
@@ -267,11 +270,11 @@ class Mechanism:
 
     def screw(self, edge: Edge) -> Screw:
         if (known := self._screws.get(edge.joint)) is None:
-            T = self.homes[edge.joint + 1]
+            T = self.zero_poses[edge.joint + 1]
             known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
         return known
 
-    def reordered(self, names: Sequence[str]) -> Mechanism:
+    def reorder(self, names: Sequence[str]) -> Mechanism:
         """Return a copy with joints in another order; remove links whose pose depends on the order.
 
         `names` lists consecutive joints outwards. The caller must check that the order gives the same motion.
@@ -279,7 +282,7 @@ class Mechanism:
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         other = copy(self)
-        vars(other).pop("edges_of", None)
+        vars(other).pop("edges_by_body", None)
         new = dict(zip(run, joints, strict=True))
         other.edges = [replace(edge, joint=new[edge]) if edge in new else edge for edge in self.edges]
         other.bodies = list(self.bodies)
@@ -293,7 +296,7 @@ class Mechanism:
         """Return whether the joints are consecutive, and the order `names` gives the same motion."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
-        consecutive = all(self._follows(inner, outer) for inner, outer in pairwise(run))
+        consecutive = all(self._are_consecutive(inner, outer) for inner, outer in pairwise(run))
         exchanged = (
             (one, other)
             for one, other in combinations(run, 2)
@@ -305,8 +308,8 @@ class Mechanism:
             and all(self._commute(*pair, tolerance) for pair in exchanged)
         )
 
-    def _follows(self, inner: Edge, outer: Edge) -> bool:
-        return inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
+    def _are_consecutive(self, inner: Edge, outer: Edge) -> bool:
+        return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """For each unbranched sequence of joints, yield all orders that give the same motion.
@@ -315,7 +318,7 @@ class Mechanism:
         """
         run: list[Edge] = []
         for edge in self.edges:
-            if run and self._follows(run[-1], edge):
+            if run and self._are_consecutive(run[-1], edge):
                 run.append(edge)
                 continue
             yield self._orders(run, tolerance)
@@ -342,15 +345,15 @@ class Mechanism:
         if not any(kind.turns for kind in kinds):
             return True
         both_turn = all(kind.turns for kind in kinds)
-        return tolerance.holds(*between_lines(self.screw(one), self.screw(other), placed=both_turn))
+        return tolerance.holds(*line_difference(self.screw(one), self.screw(other), with_distance=both_turn))
 
     @cached_property
-    def edges_of(self) -> list[list[Edge]]:
-        found: list[list[Edge]] = [[] for _ in self.bodies]
+    def edges_by_body(self) -> list[list[Edge]]:
+        edges: list[list[Edge]] = [[] for _ in self.bodies]
         for edge in self.edges:
-            found[edge.inner].append(edge)
-            found[edge.outer].append(edge)
-        return found
+            edges[edge.inner].append(edge)
+            edges[edge.outer].append(edge)
+        return edges
 
     @cached_property
     def size(self) -> float:
@@ -367,7 +370,9 @@ class Mechanism:
         the small tilts of Pinocchio's axes (URDF514).
         """
         joints = max(self.depths) + 1
-        return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
+        return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
+            j.tilt for j in self.tree.joints
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -389,19 +394,19 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
     """Return the length (m) by which comparisons multiply an angle to obtain a distance."""
-    return max(a.size, b.size, LEAST_SIZE)
+    return max(a.size, b.size, MIN_ROBOT_SIZE)
 
 
-def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
+def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, float]:
     """Return the angle (rad) between two axes, and the distance (m) from `s.point` to the line `t`.
 
-    Axes with opposite directions count as parallel. If `placed` is false, the distance is 0.
+    Axes with opposite directions count as parallel. If `with_distance` is false, the distance is 0.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
-    if not placed:
+    if not with_distance:
         return angle, 0.0
     x, y, z = (s.point - t.point).tolist()
     along = vx * x + vy * y + vz * z
@@ -423,14 +428,14 @@ class MatchedJoints:
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
             configuration.
-        axis: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
-            If A's joint is fixed, `axis` is the screw of B's joint.
-        other: Screw S' of B's joint (module docstring), with the positive direction of `axis`. It is equal to
-            `axis` unless only the joint axes of A and B differ.
+        axis_a: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
+            If A's joint is fixed, `axis_a` is the screw of B's joint.
+        axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. It is equal
+            to `axis_a` unless only the joint axes of A and B differ.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
-        unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
-            else "".
+        kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
+            differ; else "".
         conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
             equal.
     """
@@ -442,11 +447,11 @@ class MatchedJoints:
     sense: int
     offset: float
     before: FloatArray
-    axis: Screw
-    other: Screw
+    axis_a: Screw
+    axis_b: Screw
     tilt: float
     shift: float
-    unlike: str = ""
+    kind_difference: str = ""
     conversion: JointTransform | None = None
 
     @property
@@ -460,7 +465,7 @@ class FramePair:
 
     Attributes:
         previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
-        home: (4, 4) pose of A's link in the zero configuration.
+        zero_pose: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) rigid motion L after the last joint (module docstring), in A's root frame and zero
             configuration.
         tilt: Angle (rad) between the frames of the two links.
@@ -472,7 +477,7 @@ class FramePair:
     a: int
     b: int
     previous: int
-    home: FloatArray
+    zero_pose: FloatArray
     end: FloatArray
     tilt: float
     shift: float
@@ -483,7 +488,7 @@ class FramePair:
 
         The copy stores the pose of B's link relative to A's link in `tool`, and reports no difference.
         """
-        tool = inverse(self.home) @ self.end @ self.home
+        tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
     @property
@@ -499,8 +504,9 @@ class Alignment:
         base: The link of A and the link of B at which the search for matching joints started.
         X: (4, 4) pose of B's root in A's root frame.
         steps: The joint pairs, ordered outwards from the base.
-        matched: Number of joint pairs and link pairs that agree.
-        worst: Largest difference (m) between matched joints or links. Angles are multiplied by `size_of`.
+        match_count: Number of joint pairs and link pairs that agree.
+        max_difference: Largest difference (m) between matched joints or links. Angles are multiplied by
+            `size_of`.
     """
 
     a: Mechanism
@@ -511,24 +517,24 @@ class Alignment:
     frames: list[FramePair] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)
-    matched: int = 0
-    worst: float = 0.0
+    match_count: int = 0
+    max_difference: float = 0.0
 
     @property
-    def complete(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all joints of A and B are matched, and all matched joints and links agree."""
-        alike = not any(step.unlike for step in self.steps)
-        return alike and not (self.worst or self.only_a or self.only_b)
+        alike = not any(step.kind_difference for step in self.steps)
+        return alike and not (self.max_difference or self.only_a or self.only_b)
 
     @property
-    def differing(self) -> int:
-        return sum(step.differs or bool(step.unlike) for step in self.steps) + sum(
+    def difference_count(self) -> int:
+        return sum(step.differs or bool(step.kind_difference) for step in self.steps) + sum(
             frame.differs for frame in self.frames
         )
 
     @property
     def score(self) -> tuple[int, float]:
-        return self.matched, self.worst
+        return self.match_count, self.max_difference
 
     @property
     def inner_differences(self) -> tuple[float, float]:
@@ -559,13 +565,13 @@ class Alignment:
             {joints[step.a].name: step.conversion for step in self.steps if step.conversion is not None},
         )
 
-    def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
+    def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `given`. For each of the two pairs, A and B differ at
-        this pair, or at a joint or link after this pair.
+        The names of a and c occur neither in B nor in `name_map`. For each of the two pairs, A and B differ
+        at this pair, or at a joint or link after this pair.
         """
-        known_names = {joint.name for joint in self.b.tree.joints} | set(given)
+        known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
         steps = [self.steps[i] for i in sorted({i for end in ends for i in self.indices(end)})]
@@ -583,28 +589,28 @@ class Alignment:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
             # A matched pair of links on these bodies gives the transform from B's body to A's body.
-            T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
-            home, end = self.a.homes[a], IDENTITY
-            tilt, shift = pose_difference(home, T_a_b @ self.b.homes[b])
+            T_a_b = known.end @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
+            zero_pose, end = self.a.zero_poses[a], IDENTITY
+            tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
             if rounding.holds(tilt, shift):
                 tilt = shift = 0.0
             else:
-                end = T_a_b @ self.b.homes[b] @ inverse(home)
-            frames.append(FramePair(a, b, known.previous, home, end, tilt, shift))
+                end = T_a_b @ self.b.zero_poses[b] @ inverse(zero_pose)
+            frames.append(FramePair(a, b, known.previous, zero_pose, end, tilt, shift))
         return frames
 
     def indices(self, last: int) -> list[int]:
-        found = []
+        path = []
         while last >= 0:
-            found.append(last)
+            path.append(last)
             last = self.steps[last].previous
-        return found[::-1]
+        return path[::-1]
 
     def path(self, last: int) -> list[MatchedJoints]:
         return [self.steps[i] for i in self.indices(last)]
 
     @property
-    def deepest(self) -> int:
+    def depth(self) -> int:
         """Largest number of joint pairs on a path from the base, plus 1."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
@@ -639,10 +645,10 @@ class LinearFunction:
     slope: float
     constant: float
 
-    def moved(self, slope: float, constant: float) -> LinearFunction:
+    def compose(self, slope: float, constant: float) -> LinearFunction:
         return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
-    def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
+    def evaluate(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
         """Return the function's value; a variable that is not in `values` is 0."""
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
@@ -654,7 +660,7 @@ class MatchedValues:
     a: LinearFunction
     b: LinearFunction
     #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
-    written: LinearFunction
+    b_unconverted: LinearFunction
     #: Difference (rad or m) of the constants of A and B, minus the rounding error of one joint; at least 0.
     #: The value is 0 if the functions of A and B differ by more than rounding.
     rounding: float = 0.0
@@ -690,7 +696,7 @@ class Variables:
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
         return ends[0], ends[1]
 
-    def off(self, pair: MatchedValues) -> float:
+    def value_difference(self, pair: MatchedValues) -> float:
         """Return the largest difference (rad or m) between a joint's values in A and in B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
@@ -712,30 +718,30 @@ class _VariablesBuilder:
         self.trees = alignment.a.tree, alignment.b.tree
         self.step_of_b = {step.b: step for step in alignment.steps}
         self.leaders = self._leaders()
-        self.deepest = alignment.deepest
+        self.depth = alignment.depth
 
     def _leaders(self) -> dict[str, LinearFunction]:
         """Return each coordinate of B: a linear function of a coordinate of A, or a new variable."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
-        followers_last = sorted(own, key=self._follows_in_a)
+        followers_last = sorted(own, key=self._is_mimic_in_a)
         for i in followers_last:
             name = tree.joints[i].name
             lines[name] = LinearFunction(f"b:{name}", 1.0, 0.0)
             step = self.step_of_b.get(i)
-            if step is None or step.unlike:
+            if step is None or step.kind_difference:
                 continue
-            value = self._a(step)
+            value = self._value_a(step)
             if value.slope and value.variable not in used:
                 used.add(value.variable)
-                lines[name] = value.moved(step.sense, step.offset)
+                lines[name] = value.compose(step.sense, step.offset)
         return lines
 
-    def _follows_in_a(self, joint_b: int) -> bool:
+    def _is_mimic_in_a(self, joint_b: int) -> bool:
         step = self.step_of_b.get(joint_b)
         return step is not None and self.trees[0].joints[step.a].mimic is not None
 
-    def _a(self, step: MatchedJoints) -> LinearFunction:
+    def _value_a(self, step: MatchedJoints) -> LinearFunction:
         joint = self.trees[0].joints[step.a]
         if joint.kind is JointKind.FIXED:
             return LinearFunction("", 0.0, 0.0)
@@ -743,32 +749,32 @@ class _VariablesBuilder:
             return LinearFunction(f"a:{joint.name}", 1.0, 0.0)
         return LinearFunction(f"a:{joint.mimic.leader}", joint.mimic.multiplier, joint.mimic.offset)
 
-    def _b(self, step: MatchedJoints) -> LinearFunction:
+    def _value_b(self, step: MatchedJoints) -> LinearFunction:
         joint = self.trees[1].joints[step.b]
         if joint.kind is JointKind.FIXED:
             return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
             return self.leaders[joint.name]
-        return self.leaders[joint.mimic.leader].moved(joint.mimic.multiplier, joint.mimic.offset)
+        return self.leaders[joint.mimic.leader].compose(joint.mimic.multiplier, joint.mimic.offset)
 
     def variables(self) -> Variables:
         pairs, rules = list[MatchedValues | None](), list[int]()
         for i, step in enumerate(self.alignment.steps):
-            if step.kind in ("planar", "floating") or step.unlike == "kind":
+            if step.kind in ("planar", "floating") or step.kind_difference == "kind":
                 pairs.append(None)
                 continue
-            a, written = self._a(step), self._b(step)
-            b = written.moved(step.sense, -step.sense * step.offset)
+            a, b_unconverted = self._value_a(step), self._value_b(step)
+            b = b_unconverted.compose(step.sense, -step.sense * step.offset)
             rounding = 0.0
-            if self._alike(a, b):
-                rounding = max(0.0, abs(a.constant - b.constant) - self._one_step(a))
+            if self._are_equal(a, b):
+                rounding = max(0.0, abs(a.constant - b.constant) - self._joint_rounding(a))
                 b = a
-            elif not step.unlike:
+            elif not step.kind_difference:
                 rules.append(i)
-            pairs.append(MatchedValues(a, b, written, rounding))
+            pairs.append(MatchedValues(a, b, b_unconverted, rounding))
         return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.leaders)
 
-    def _alike(self, a: LinearFunction, b: LinearFunction) -> bool:
+    def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.
 
         The constants depend on zero offsets, which urdfkin computes from poses. The rounding error of a pose
@@ -777,10 +783,10 @@ class _VariablesBuilder:
         rounding error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
-        one = self._one_step(a)
-        return same and abs(a.slope - b.slope) <= one and abs(a.constant - b.constant) <= self.deepest * one
+        one = self._joint_rounding(a)
+        return same and abs(a.slope - b.slope) <= one and abs(a.constant - b.constant) <= self.depth * one
 
-    def _one_step(self, line: LinearFunction) -> float:
+    def _joint_rounding(self, line: LinearFunction) -> float:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
@@ -804,13 +810,13 @@ class _VariablesBuilder:
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
                 if pair is None:  # joints of different kinds do not share a variable
-                    if step.unlike and joint.nq == 1:
-                        own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
+                    if step.kind_difference and joint.nq == 1:
+                        own[f"{'ab'[k]}:{joint.name}"] = joint_limits(joint)
                     continue
-                if not (line := (pair.a, pair.written)[k]).slope:
+                if not (line := (pair.a, pair.b_unconverted)[k]).slope:
                     continue
                 if joint.mimic is None:
-                    low, high = sorted((end - line.constant) / line.slope for end in limits(joint))
+                    low, high = sorted((end - line.constant) / line.slope for end in joint_limits(joint))
                     restrict(k, line.variable, (low, high))
                 else:
                     mimic.add(line.variable)
@@ -818,12 +824,12 @@ class _VariablesBuilder:
         for k, unpaired in enumerate((self.alignment.only_a, self.alignment.only_b)):
             for joint in (self.trees[k].joints[j] for j in unpaired):
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
-                    restrict(k, name, limits(joint))
+                    restrict(k, name, joint_limits(joint))
         ranges = {name: own.get(name, (-math.inf, math.inf)) for name in [*own, *sorted(mimic - set(own))]}
         return {name: ends if ends[0] < ends[1] else first.get(name, ends) for name, ends in ranges.items()}
 
 
-def limits(joint: Joint) -> tuple[float, float]:
+def joint_limits(joint: Joint) -> tuple[float, float]:
     if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
         return -math.inf, math.inf
     low, high = sorted((joint.limit.lower, joint.limit.upper))

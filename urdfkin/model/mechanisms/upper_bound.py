@@ -47,7 +47,7 @@ from functools import cache
 
 import numpy as np
 
-from urdfkin.kinematics.rotation import axis_aligning, rotation_about
+from urdfkin.kinematics.rotation import rotation_about, rotation_with_z_axis
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
@@ -108,7 +108,7 @@ class Support:
     grid: Grid
     values: FloatArray
 
-    def at(self, u: FloatArray) -> FloatArray:
+    def evaluate(self, u: FloatArray) -> FloatArray:
         """Return upper bounds (...) on h(u) for vectors u (..., 3) of any length; 0 for the zero vector."""
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
@@ -139,10 +139,10 @@ class Support:
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
-        best = centred.rotated_values(screw.direction, angles, factors).max(axis=0)
+        best = centred.rotate_values(screw.direction, angles, factors).max(axis=0)
         return Support(self.grid, best + G @ screw.point)
 
-    def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
+    def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
 
         For each angle (rad), let R be the rotation of the set of points about `axis`. Since h'(u) is
@@ -154,7 +154,7 @@ class Support:
         along = (G @ axis)[:, np.newaxis] * axis
         R = rotation_about(axis, angles)  # a row vector times R equals R^T times the column vector
         across = (G - along) @ R * np.reshape(factors, (-1, 1, 1))
-        return self.at(along + across)
+        return self.evaluate(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
         """Return the support function after translations by all distances from low to high (m)."""
@@ -164,16 +164,16 @@ class Support:
         return Support(self.grid, self.values + shifts)
 
     def transform(self, T: FloatArray) -> Support:
-        return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
+        return Support(self.grid, self.evaluate(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
         """Return an upper bound (m) on the distance of any point of the set from a screw's line."""
-        x, y, _ = axis_aligning(screw.direction).T
+        x, y, _ = rotation_with_z_axis(screw.direction).T
         corners = _corners(0.0, _FULL_TURN, _CORNERS)
         u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
-        return float(max((self.at(u) - u @ screw.point).max(), 0.0))
+        return float(max((self.evaluate(u) - u @ screw.point).max(), 0.0))
 
-    def largest(self) -> float:
+    def max_distance(self) -> float:
         """Return an upper bound (m) on the distance of any point of the set from the origin.
 
         Let g_k be the four corners of a grid cell. A vector u in the direction of a point of the cell is a
@@ -190,7 +190,7 @@ class Support:
         return Support(self.grid, self.values + other.values)
 
 
-def point(grid: Grid, p: FloatArray) -> Support:
+def point_support(grid: Grid, p: FloatArray) -> Support:
     return Support(grid, grid.points @ p)
 
 
@@ -210,15 +210,15 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: `FINE` gives a smaller bound than `COARSE`, but takes longer.
-COARSE, FINE = Grid(8, 24), Grid(16, 48)
+#: `FINE_GRID` gives a smaller bound than `COARSE_GRID`, but takes longer.
+COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
 #: Maximum number of sample values of a revolute joint's variable.
 #: If a range would need more samples, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
 def upper_bounds(
-    alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
+    alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE_GRID
 ) -> tuple[float, float]:
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
@@ -229,11 +229,11 @@ def upper_bounds(
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
         return 0.0, 0.0
-    if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
+    if any(step.kind_difference and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _angle_bound(steps, pairs, variables, frame)
     if not steps:  # no joint differs, so the distance is equal in all configurations
-        d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
+        d = frame.end[:3, :3] @ frame.zero_pose[:3, 3] + frame.end[:3, 3] - frame.zero_pose[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _distance_bound(steps, pairs, variables, frame, grid), radians
 
@@ -252,7 +252,7 @@ def from_first_difference(
 
 
 def _differs(step: MatchedJoints, pair: MatchedValues | None) -> bool:
-    return step.differs or bool(step.unlike) or (pair is not None and pair.a != pair.b)
+    return step.differs or bool(step.kind_difference) or (pair is not None and pair.a != pair.b)
 
 
 def _angle_bound(
@@ -267,13 +267,13 @@ def _angle_bound(
         total += pose_difference(IDENTITY, step.before)[0]
         if step.kind != "turns" or pair is None:
             continue
-        if step.other is not step.axis:
+        if step.axis_b is not step.axis_a:
             # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes.
             # For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
-            total += variables.off(pair)
+            total += variables.value_difference(pair)
     return min(total, math.pi)
 
 
@@ -285,12 +285,12 @@ def _distance_bound(
     grid: Grid,
 ) -> float:
     d, y = start_at_frame(frame, grid)
-    by_constant_motions = _displacement_bound(frame.end, y.largest())
+    by_constant_motions = _displacement_bound(frame.end, y.max_distance())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
         d, y = after_joint(step, pair, variables, d, y)
-        moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
-        by_constant_motions += _displacement_bound(step.before, y.largest()) if moves_alike else math.inf
-    return min(d.largest(), by_constant_motions)
+        moves_alike = step.axis_b is step.axis_a and pair is not None and pair.a == pair.b
+        by_constant_motions += _displacement_bound(step.before, y.max_distance()) if moves_alike else math.inf
+    return min(d.max_distance(), by_constant_motions)
 
 
 def _displacement_bound(L: FloatArray, reach: float) -> float:
@@ -306,9 +306,9 @@ def _product(factor: float, reach: float) -> float:
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
     """Return the start of the recursion (module docstring): the support functions of d and y at the frame."""
-    p, end = frame.home[:3, 3], frame.end
+    p, end = frame.zero_pose[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
-    return point(grid, y - p), point(grid, y)
+    return point_support(grid, y - p), point_support(grid, y)
 
 
 def after_joint(
@@ -318,12 +318,16 @@ def after_joint(
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
-        d = Support(d.grid, d.largest() * d.grid.lengths)
+        d = Support(d.grid, d.max_distance() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
         d = d_after_joint(step, pair, variables, y, d)
         ends = variables.range(pair.b)
-        y = y.rotate(step.other, *ends) if step.kind == "turns" else y.translate(step.other.direction, *ends)
+        y = (
+            y.rotate(step.axis_b, *ends)
+            if step.kind == "turns"
+            else y.translate(step.axis_b.direction, *ends)
+        )
     return after_constant_motion(step, d, y)
 
 
@@ -332,16 +336,16 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
-    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.transform(L)
+    return Support(d.grid, d.values + y.evaluate(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.transform(L)
 
 
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
     """Return the support function of d (module docstring) after a joint's motion, without the motion L."""
-    same = step.other is step.axis and pair.a == pair.b
+    same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
-        about = Screw(step.axis.direction, np.zeros(3))
+        about = Screw(step.axis_a.direction, np.zeros(3))
         if same:
             return d.rotate(about, *variables.range(pair.a)) if d.values.any() else d
         z = _values(pair, variables, d.grid)
@@ -360,16 +364,16 @@ def _prismatic_difference(
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
-        values = [(pair.a.at({name: z}), pair.b.at({name: z})) for z in ends]
+        values = [(pair.a.evaluate({name: z}), pair.b.evaluate({name: z})) for z in ends]
     else:
         values = [(t, other) for t in variables.range(pair.a) for other in variables.range(pair.b)]
     with np.errstate(invalid="ignore"):
-        found = [
-            grid.points @ step.other.direction * other - grid.points @ step.axis.direction * t
+        differences = [
+            grid.points @ step.axis_b.direction * other - grid.points @ step.axis_a.direction * t
             for t, other in values
         ]
-    worst = np.max(found, axis=0)
-    return Support(grid, np.where(np.isnan(worst), np.inf, worst))
+    max_difference = np.max(differences, axis=0)
+    return Support(grid, np.where(np.isnan(max_difference), np.inf, max_difference))
 
 
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
@@ -410,16 +414,16 @@ def _common_difference(
     axis.
     """
     G = y.grid.points
-    axis, other = step.axis, step.other
+    axis, other = step.axis_a, step.axis_b
     t, t_other = (line.constant + line.slope * z for line in (pair.a, pair.b))
     turns = [rotation_about(screw.direction, values) for screw, values in ((axis, t), (other, t_other))]
     D = turns[1] - turns[0]
     c = (other.point - turns[1] @ other.point) - (axis.point - turns[0] @ axis.point)
-    at_samples = y.at(G @ D) + (G @ c.T).T
+    at_samples = y.evaluate(G @ D) + (G @ c.T).T
     radius = y.radius(other)
     if pair.a.slope == pair.b.slope:
         tilt = float(np.linalg.norm(other.direction - axis.direction))
-        reach = Support(y.grid, y.values - G @ other.point).largest() if tilt else 0.0
+        reach = Support(y.grid, y.values - G @ other.point).max_distance() if tilt else 0.0
         axis_offset = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
         angle_offset = abs(pair.b.constant - pair.a.constant)
         second = _product(2.0 * tilt + min(angle_offset, 2.0), radius) + tilt * reach + axis_offset
@@ -430,8 +434,8 @@ def _common_difference(
     between = between + second * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
     if d.values.any():
         half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
-        ends = d.rotated_values(axis.direction, t, 1.0)
-        middles = d.rotated_values(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
+        ends = d.rotate_values(axis.direction, t, 1.0)
+        middles = d.rotate_values(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
         between += np.maximum(np.maximum(ends[:-1], ends[1:]), middles)
     return Support(y.grid, between.max(axis=0))
 
@@ -445,12 +449,14 @@ def _independent_difference(
     largest difference of the angles. If the axes differ, the change of d is e(S' t') y - e(S t) y (module
     docstring). The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
     """
-    G, u = y.grid.points, step.axis.direction
-    if step.other is not step.axis:
-        y_b = y.rotate(step.other, *variables.range(pair.b))
-        y_a = y.rotate(step.axis, *variables.range(pair.a))
-        return Support(y.grid, y_b.values + y_a.at(-G))
-    chord = _product(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
+    G, u = y.grid.points, step.axis_a.direction
+    if step.axis_b is not step.axis_a:
+        y_b = y.rotate(step.axis_b, *variables.range(pair.b))
+        y_a = y.rotate(step.axis_a, *variables.range(pair.a))
+        return Support(y.grid, y_b.values + y_a.evaluate(-G))
+    chord = _product(
+        2.0 * math.sin(min(variables.value_difference(pair), math.pi) / 2.0), y.radius(step.axis_a)
+    )
     across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
     return Support(y.grid, np.array([_product(length, chord) for length in across]))
 
@@ -492,7 +498,7 @@ def _second_derivatives(
 ) -> Iterator[tuple[int, int, float]]:
     """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
     free = [_as_free_vectors(step) for step in steps]
-    d, y = start_at_frame(frame, COARSE)
+    d, y = start_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
         first = _derivatives(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":
@@ -518,7 +524,7 @@ def _pass_to_front(
         vectors = (
             after_constant_motion(step, *vectors) if slides else after_joint(step, pair, variables, *vectors)
         )
-    return vectors[0].largest()
+    return vectors[0].max_distance()
 
 
 def _derivatives(
@@ -529,9 +535,9 @@ def _derivatives(
     The module docstring defines the symbols. The callers apply L to the result.
     """
     if step.kind != "turns":
-        u, other = step.axis.direction, step.other.direction
-        return point(d.grid, other - u), point(d.grid, other)
-    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.other, *variables.range(pair.b))
+        u, other = step.axis_a.direction, step.axis_b.direction
+        return point_support(d.grid, other - u), point_support(d.grid, other)
+    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.axis_b, *variables.range(pair.b))
     return _cross_products(step, d, y)
 
 
@@ -540,15 +546,15 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
     The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
     """
-    G, axis, other = d.grid.points, step.axis, step.other
+    G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
     if other is not axis:
-        reach = Support(d.grid, y.values - G @ other.point).largest()
+        reach = Support(d.grid, y.values - G @ other.point).max_distance()
         by_axes = float(np.linalg.norm(other.direction - axis.direction)) * reach
         by_axes += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
     across_a, across_b = np.cross(G, axis.direction), np.cross(G, other.direction)
-    d_cross = Support(d.grid, d.at(across_a) + by_axes * d.grid.lengths)
-    return d_cross, Support(d.grid, y.at(across_b) - across_b @ other.point)
+    d_cross = Support(d.grid, d.evaluate(across_a) + by_axes * d.grid.lengths)
+    return d_cross, Support(d.grid, y.evaluate(across_b) - across_b @ other.point)
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
@@ -556,10 +562,10 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 
     Translations do not affect free vectors.
     """
-    axis = Screw(step.axis.direction, np.zeros(3))
-    other = axis if step.other is step.axis else Screw(step.other.direction, np.zeros(3))
+    axis = Screw(step.axis_a.direction, np.zeros(3))
+    other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
-    return replace(step, axis=axis, other=other, before=before)
+    return replace(step, axis_a=axis, axis_b=other, before=before)
 
 
 def relevant_joints(

@@ -2,14 +2,14 @@
 
 from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.lint.runner import check, check_text
-from urdfkin.urdf.records import DEFAULT_LIMITS, Limits
+from urdfkin.urdf.records import DEFAULT_SIZE_LIMITS, SizeLimits
 
 __all__ = [
-    "DEFAULT_LIMITS",
+    "DEFAULT_SIZE_LIMITS",
     "Finding",
-    "Limits",
     "PinocchioReading",
     "Severity",
+    "SizeLimits",
     "UrdfError",
     "UrdfWarning",
     "check",

@@ -6,7 +6,7 @@ urdfkin accepts a fix if three conditions hold:
 - The new file has no new findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
-  change by at most `Fix.turns` (rad).
+  change by at most `Fix.max_rotation` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
@@ -29,63 +29,65 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from urdfkin.urdf.findings import Finding, Severity, apply
-from urdfkin.urdf.lint.runner import Examined
-from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
-from urdfkin.urdf.sources import Text
+from urdfkin.urdf.findings import Finding, Severity, apply_fixes
+from urdfkin.urdf.lint.runner import Examination
+from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, RobotRecord
+from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
-PASSES = 100
+MAX_PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
-TILT = Fraction(1, 2**52)
+MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
 @dataclass(frozen=True, slots=True)
-class Mended:
-    """A fixed file; `kept` contains the reasons, by code, why other findings were not fixed."""
+class FixResult:
+    """A fixed file; `unfixed_reasons` contains the reasons, by code, why other findings were not fixed."""
 
-    text: Text
-    fixed: tuple[Finding, ...]
-    kept: dict[str, str]
+    text: UrdfText
+    fixed_findings: tuple[Finding, ...]
+    unfixed_reasons: dict[str, str]
 
 
-def mend(
-    text: Text, look: Callable[[Text], Examined], choose: Callable[[], Callable[[Finding], bool]]
-) -> Mended:
+def fix_text(
+    text: UrdfText,
+    examine: Callable[[UrdfText], Examination],
+    choose: Callable[[], Callable[[Finding], bool]],
+) -> FixResult:
     """Apply the automatic fixes, one code after another; do not change a file with errors.
 
     `choose` is called before each pass, and returns a function that selects the findings to fix.
     """
-    now, fixed, kept = look(text), list[Finding](), dict[str, str]()
-    for _ in range(PASSES):
-        chosen = filter(choose(), now.findings)
-        candidates = [finding for finding in chosen if finding.fix and finding.code not in kept]
+    current, fixed, unfixed_reasons = examine(text), list[Finding](), dict[str, str]()
+    for _ in range(MAX_PASSES):
+        chosen = filter(choose(), current.findings)
+        candidates = [finding for finding in chosen if finding.fix and finding.code not in unfixed_reasons]
         if not candidates:
             break
         code = candidates[0].code
-        if error := next((f.code for f in now.findings if f.severity is Severity.ERROR), None):
-            kept |= {
+        if error := next((f.code for f in current.findings if f.severity is Severity.ERROR), None):
+            unfixed_reasons |= {
                 finding.code: f"the file has an error ({error}); correct this error first"
                 for finding in candidates
             }
             break
         by_fix = {id(f.fix): f for f in candidates if f.code == code}
-        data, applied = apply(now.text.data, (f.fix for f in by_fix.values() if f.fix))
+        data, applied = apply_fixes(current.text.data, (f.fix for f in by_fix.values() if f.fix))
         fixable = [by_fix[id(fix)] for fix in applied]
-        after = look(replace(now.text, data=data))
-        if objection := next(_objections(now, after, fixable), None):
-            kept[code] = objection
+        after = examine(replace(current.text, data=data))
+        if objection := next(_find_objections(current, after, fixable), None):
+            unfixed_reasons[code] = objection
         else:
-            now = after
+            current = after
             fixed += fixable
-    return Mended(now.text, tuple(fixed), kept)
+    return FixResult(current.text, tuple(fixed), unfixed_reasons)
 
 
-def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
+def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
     # `findings` contains only some findings of a very frequent code. Such codes are not compared.
-    many = {finding.code for finding in before.findings if finding.also}
+    many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
     if appeared := new - old:
@@ -96,91 +98,91 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
         if before.robot is not after.robot:
             yield "the fixed file would not be a URDF"
         return
-    turns = defaultdict[str, float](float)
+    max_rotations = defaultdict[str, float](float)
     for finding in fixable:
-        turns[finding.name or ""] += finding.fix.turns if finding.fix else 0.0
-    yield from differences(before.robot, after.robot, turns)
+        max_rotations[finding.name or ""] += finding.fix.max_rotation if finding.fix else 0.0
+    yield from find_differences(before.robot, after.robot, max_rotations)
 
 
-def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
+def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each difference between two robots.
 
-    The function compares the version, the links, and the joint values that URDF readers use. `turns`
+    The function compares the version, the links, and the joint values that URDF readers use. `max_rotations`
     contains the angle (rad) by which a joint origin may rotate, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
     for one, other in zip(a.joints, b.joints, strict=True):
-        if what := _difference(one, other, turns.get(one.name, 0.0)):
+        if what := _find_difference(one, other, max_rotations.get(one.name, 0.0)):
             yield f"the fix would change the {what} of joint {one.name}"
 
 
-def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
+def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str | None:
     # If roll, pitch or yaw changes by an angle, the frame rotates by at most this angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
         "name, type, parent or child": names_a == names_b,
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
-        "orientation": rotation <= Fraction(turns) * _SLACK,
-        "axis": a.kind not in AXIAL or _same_direction(a.axis, b.axis),
-        "limit": _limits(a) == _limits(b),
-        "mimic": a.kind == "fixed" or _rule(a) == _rule(b),
+        "orientation": rotation <= Fraction(max_rotation) * _SLACK,
+        "axis": a.kind not in AXIAL_TYPES or _same_direction(a.axis, b.axis),
+        "limit": _effective_limits(a) == _effective_limits(b),
+        "mimic": a.kind == "fixed" or _mimic_rule(a) == _mimic_rule(b),
     }
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that covers the rounding errors of `Fix.turns`, which is a sum of doubles.
+#: Factor that covers the rounding errors of `Fix.max_rotation`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `TILT`, computed without rounding."""
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`, computed without rounding."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
     cross = (ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2
     lengths = (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)
-    return ax * bx + ay * by + az * bz > 0 and cross <= TILT**2 * lengths
+    return ax * bx + ay * by + az * bz > 0 and cross <= MAX_AXIS_TILT**2 * lengths
 
 
-def _limits(joint: JointRecord) -> tuple[float | None, ...]:
+def _effective_limits(joint: JointRecord) -> tuple[float | None, ...]:
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
     return tuple(getattr(joint.limit, name) for name in (*bounded, "effort", "velocity", *FURTHER_LIMITS))
 
 
-def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
+def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     rule = joint.mimic
     return None if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
 #: Number of bytes in each line of git's binary patch.
-_IN_A_LINE = 52
+_BYTES_IN_A_LINE = 52
 #: In git's binary patch, the first letter of a line encodes the number of bytes of the line.
-_COUNTS = string.ascii_uppercase + string.ascii_lowercase
+_LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
-def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one UTF-8 file; `shown` escapes the control characters of a text."""
+def make_patch(file: str, before: bytes, after: bytes, escape: Callable[[str], str]) -> str:
+    """Return the patch of one UTF-8 file; `escape` escapes the control characters of a text."""
     if before == after:
         return ""
-    name = _relative(file)
-    text = _unified_diff(name, before, after)
-    if shown(text) == text:
+    name = _relative_path(file)
+    text = _make_unified_diff(name, before, after)
+    if escape(text) == text:
         return text
-    lines = shown(text.replace("\r", "\\r")).splitlines()
-    return "".join(f"# {line}\n" for line in lines) + _binary(name, before, after)
+    lines = escape(text.replace("\r", "\\r")).splitlines()
+    return "".join(f"# {line}\n" for line in lines) + _make_binary_patch(name, before, after)
 
 
-def _relative(file: str) -> str:
+def _relative_path(file: str) -> str:
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 
 
-def _unified_diff(name: str, before: bytes, after: bytes) -> str:
+def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
     end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends a line only at a line feed.
@@ -199,7 +201,7 @@ def _quote(name: str) -> str:
     ) + '"'  # fmt: skip
 
 
-def _binary(name: str, before: bytes, after: bytes) -> str:
+def _make_binary_patch(name: str, before: bytes, after: bytes) -> str:
     here = Path.cwd()
     top = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     place = os.path.relpath(name, top)
@@ -211,7 +213,7 @@ def _binary(name: str, before: bytes, after: bytes) -> str:
 
 def _encode(data: bytes) -> str:
     packed = zlib.compress(data)
-    pieces = (packed[i : i + _IN_A_LINE] for i in range(0, len(packed), _IN_A_LINE))
+    pieces = (packed[i : i + _BYTES_IN_A_LINE] for i in range(0, len(packed), _BYTES_IN_A_LINE))
     return "".join(
-        f"{_COUNTS[len(piece) - 1]}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces
+        f"{_LENGTH_LETTERS[len(piece) - 1]}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces
     )

@@ -15,24 +15,26 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, severity_counts, totals
-from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
+from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, count_by_severity, format_counts
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, find_rule, page
 
-SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
 
-def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
+def as_sarif(
+    findings: Sequence[Finding], version: str, silenced_findings: Sequence[tuple[Finding, str]] = ()
+) -> str:
     """Return a SARIF document with all rules about URDF files, and a result for each finding."""
     codes = {finding.code for finding in findings}
-    rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
+    rules = RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
     results = [_result(finding, index[finding.code]) for finding in findings]
-    for finding, reason in silenced:
+    for finding, reason in silenced_findings:
         suppression = {"kind": "inSource", "justification": reason}
         results.append(_result(finding, index[finding.code]) | {"suppressions": [suppression]})
     driver = {"name": "urdfkin", "version": version, "rules": [_rule(rule) for rule in rules.values()]}
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
-    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
@@ -42,7 +44,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "name": "".join(word.capitalize() for word in rule.slug.split("-")),
         "shortDescription": {"text": content.title},
         "fullDescription": {"text": content.why},
-        "help": {"text": f"{content.why}\n\n{content.others}"},
+        "help": {"text": f"{content.why}\n\n{content.other_readers}"},
         "defaultConfiguration": {"level": rule.severity.value},
     }
 
@@ -55,8 +57,8 @@ def _result(finding: Finding, rule: int) -> dict[str, Any]:
         "message": {"text": finding.sentence},
         "locations": [_location(finding)],
     }
-    if finding.oracle is not None:
-        result["properties"] = {"pinocchio": finding.oracle.value}
+    if finding.pinocchio_reading is not None:
+        result["properties"] = {"pinocchio": finding.pinocchio_reading.value}
     if finding.fix is not None:
         result["fixes"] = [_fix(finding, finding.fix)]
     return result
@@ -98,11 +100,11 @@ def _uri(file: str) -> str:
 JSON_VERSION = 1
 
 
-def summary(findings: Sequence[Finding], files: int) -> str:
-    return f"{totals(findings)} in {files} file" + ("" if files == 1 else "s")
+def format_summary(findings: Sequence[Finding], files: int) -> str:
+    return f"{format_counts(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
-def statistics(findings: Sequence[Finding]) -> Iterator[str]:
+def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield a line for each code, the most frequent first; `[*]` marks codes with fixes."""
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
@@ -119,7 +121,7 @@ def as_json(
     findings: Sequence[Finding],
     files: Sequence[str],
     version: str,
-    silenced: Sequence[tuple[Finding, str]] = (),
+    silenced_findings: Sequence[tuple[Finding, str]] = (),
 ) -> str:
     """Return the findings as a JSON document; positions in a `fix` are byte indices."""
     document = {
@@ -127,9 +129,9 @@ def as_json(
         "version": JSON_VERSION,
         "urdfkin": version,
         "files": list(files),
-        "counts": severity_counts(findings),
+        "counts": count_by_severity(findings),
         "findings": [_entry(finding) for finding in findings],
-        "silenced": [_entry(finding) | {"reason": reason} for finding, reason in silenced],
+        "silenced": [_entry(finding) | {"reason": reason} for finding, reason in silenced_findings],
     }
     return json.dumps(document, indent=2)
 

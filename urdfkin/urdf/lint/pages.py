@@ -2,8 +2,8 @@
 
 The rules are defined in the parser and in the modules of `lint.rules`. The folder of each module also
 contains a TOML file with the name of the module. The file documents each rule of the module in a table, the
-page of the rule. If an entry such as `cure`, `others` or `question` is at the top of the file, the entry is
-the default for all pages.
+page of the rule. If an entry such as `correction`, `other_readers` or `question` is at the top of the file,
+the entry is the default for all pages.
 
 The table `parts` defines texts that replace `{name}` in examples. Each entry is a string, or a pair
 [text, times] for a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in
@@ -37,13 +37,15 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
 #: The rules about MJCF and USD files.
-OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
+MJCF_AND_USD_RULES = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
-CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
+CODE_BY_NAME = {
+    word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)
+}
 
-_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
-_TOPIC |= dict.fromkeys(OF_OTHERS, "left_out")
+_TOPIC_OF_CODE = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
+_TOPIC_OF_CODE |= dict.fromkeys(MJCF_AND_USD_RULES, "left_out")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +55,20 @@ class Page:
     Attributes:
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
             example begins with a joint or a comment, the links `base` and `tip` must be added.
-        cure: The corrected example.
-        others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
+        correction: The corrected example.
+        other_readers: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
     """
 
     title: str
     why: str
     example: str
-    cure: str
-    others: str
+    correction: str
+    other_readers: str
     question: QuestionsSection | None = None
 
 
 def page(code: str) -> Page:
-    return topic_pages(_TOPIC[code])[code]
+    return topic_pages(_TOPIC_OF_CODE[code])[code]
 
 
 def page_files() -> dict[str, Traversable]:
@@ -83,16 +85,16 @@ def topic_pages(topic: str) -> dict[str, Page]:
     data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
     return {
-        code: _page({**data, **defaults, **data[code]})
+        code: _make_page({**data, **defaults, **data[code]})
         for code in data
         if code.startswith(("URDF", "MJCF", "USD"))
     }
 
 
-def _page(entry: dict[str, Any]) -> Page:
-    prose = {key: " ".join(entry[key].split()) for key in ("title", "why", "others")}
+def _make_page(entry: dict[str, Any]) -> Page:
+    prose = {key: " ".join(entry[key].split()) for key in ("title", "why", "other_readers")}
     parts = entry.get("parts", {})
-    texts = {key: _expand_parts(entry[key], parts) for key in ("example", "cure")}
+    texts = {key: _expand_parts(entry[key], parts) for key in ("example", "correction")}
     return Page(
         **prose, **texts, question=QuestionsSection(entry["question"]) if "question" in entry else None
     )
@@ -106,8 +108,10 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    known, name = RULES | OF_OTHERS, word.strip().lower()
-    codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
+    known, name = RULES | MJCF_AND_USD_RULES, word.strip().lower()
+    codes = CODE_BY_NAME | {
+        name: rule.id for rule in MJCF_AND_USD_RULES.values() for name in (rule.id.lower(), rule.slug)
+    }
     if name not in codes:
         raise UnknownNameError("code", word, [*known, *(rule.slug for rule in known.values())])
     return known[codes[name]]
@@ -121,7 +125,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     """
     prefix = word.strip().upper()
     prefix = f"URDF{prefix}" if prefix.isdigit() else prefix
-    every = RULES | OF_OTHERS
+    every = RULES | MJCF_AND_USD_RULES
     family = tuple(rule for rule in every.values() if rule.id.startswith(prefix))
     if prefix == "ALL":
         return tuple(every.values())
@@ -129,22 +133,22 @@ def find_rules(word: str) -> tuple[Rule, ...]:
 
 
 #: Maximum number of characters in a line of a printed example.
-_WIDEST = 100
+_MAX_EXAMPLE_WIDTH = 100
 #: Width of prose on a terminal, in characters.
-WIDTH = 88
+PROSE_WIDTH = 88
 
 
 def explain(rule: Rule) -> str:
     content = page(rule.id)
     paragraphs = [
         f"{rule.id} {rule.slug} ({rule.severity.value})",
-        textwrap.fill(content.title[0].upper() + content.title[1:] + ".", WIDTH),
-        textwrap.fill(content.why, WIDTH),
+        textwrap.fill(content.title[0].upper() + content.title[1:] + ".", PROSE_WIDTH),
+        textwrap.fill(content.why, PROSE_WIDTH),
         "Found in:\n\n" + _example(content.example),
-        "Better:\n\n" + _example(content.cure),
-        textwrap.fill(content.others, WIDTH),
+        "Better:\n\n" + _example(content.correction),
+        textwrap.fill(content.other_readers, PROSE_WIDTH),
     ]
-    if rule.oracle is not None:
+    if rule.pinocchio_reading is not None:
         paragraphs.append(
             "Pinocchio cannot check the results of a robot that has this finding.\n"
             "urdfkin reports these results as not verified."
@@ -156,5 +160,7 @@ def explain(rule: Rule) -> str:
 
 def _example(text: str) -> str:
     lines = [printable(line) for line in text.strip("\n").split("\n")]
-    cut = [line if len(line) <= _WIDEST else line[: _WIDEST - 4] + " ..." for line in lines]
+    cut = [
+        line if len(line) <= _MAX_EXAMPLE_WIDTH else line[: _MAX_EXAMPLE_WIDTH - 4] + " ..." for line in lines
+    ]
     return "\n".join(f"    {line}" for line in cut).rstrip()

@@ -11,15 +11,15 @@ from pathlib import Path
 
 from urdfkin.errors.validators import as_bool, as_str
 from urdfkin.urdf.findings import Finding, Findings, Reporter
-from urdfkin.urdf.lint.pages import CODES
+from urdfkin.urdf.lint.pages import CODE_BY_NAME
 from urdfkin.urdf.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
 from urdfkin.urdf.lint.rules.dialect import (
+    apply_comments,
     check_dialect,
     check_names,
     check_prefixes,
-    check_unused,
+    check_unused_comments,
     check_vocabulary,
-    read_comments,
 )
 from urdfkin.urdf.lint.rules.joints import (
     check_axes,
@@ -29,14 +29,14 @@ from urdfkin.urdf.lint.rules.joints import (
     check_suspicious,
 )
 from urdfkin.urdf.parser import read_document, read_robot
-from urdfkin.urdf.records import DEFAULT_LIMITS, Limits, RobotRecord
-from urdfkin.urdf.sources import Source, Text, read_source
+from urdfkin.urdf.records import DEFAULT_SIZE_LIMITS, RobotRecord, SizeLimits
+from urdfkin.urdf.sources import Source, UrdfText, read_source
 
 
 def check(
     source: Source,
     *,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: SizeLimits = DEFAULT_SIZE_LIMITS,
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
@@ -61,8 +61,8 @@ def check(
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
         empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
-        contains the first 10,000. The attribute `also` of the 10,000th finding lists the line numbers of all
-        further findings.
+        contains the first 10,000. The attribute `other_lines` of the 10,000th finding lists the line numbers
+        of all further findings.
 
     Raises:
         SourceError: the file cannot be read.
@@ -84,52 +84,58 @@ def check(
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
+class Examination:
     """The result of a check; `robot` is None if the text is not a URDF.
 
-    `data` has no byte order mark, and findings state positions in `data`. `silenced` contains silenced
-    findings, each with the reason in the comment.
+    `data` has no byte order mark, and findings state positions in `data`. `silenced_findings` contains
+    silenced findings, each with the reason in the comment.
     """
 
-    text: Text
+    text: UrdfText
     data: bytes
     robot: RobotRecord | None
     findings: tuple[Finding, ...]
-    silenced: tuple[tuple[Finding, str], ...]
+    silenced_findings: tuple[tuple[Finding, str], ...]
 
 
 def examine(
-    text: Text,
+    text: UrdfText,
     *,
-    limits: Limits = DEFAULT_LIMITS,
+    limits: SizeLimits = DEFAULT_SIZE_LIMITS,
     mimic: bool | None = None,
     root_joint: str | None = None,
     fold: bool = False,
-    wanted: Callable[[Finding], bool] | None = None,
-) -> Examined:
+    is_reported: Callable[[Finding], bool] | None = None,
+) -> Examination:
     """Check a text; the function `check` documents the arguments.
 
-    `wanted` returns False for a finding that must not be reported. Such findings are removed first, and then
-    the remaining findings are combined.
+    `is_reported` returns False for a finding that must not be reported. Such findings are removed first, and
+    then the remaining findings are combined.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)
     robot = read_urdf(report, mimic=mimic, root_joint=root_joint)
     if robot is not None:
-        check_meshes(report, robot.element, file_of(text))
-        check_unused(report)
-    return Examined(
-        text, report.data, robot, report.findings(fold=fold, wanted=wanted), tuple(report.silenced)
+        check_meshes(report, robot.element, find_local_path(text))
+        check_unused_comments(report)
+    return Examination(
+        text,
+        report.data,
+        robot,
+        report.findings(fold=fold, is_reported=is_reported),
+        tuple(report.silenced_findings),
     )
 
 
-def file_of(text: Text) -> Path | None:
+def find_local_path(text: UrdfText) -> Path | None:
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
 
-def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
+def check_text(
+    data: bytes, *, limits: SizeLimits = DEFAULT_SIZE_LIMITS, fold: bool = True
+) -> tuple[Finding, ...]:
     """Check the bytes of a URDF; open no file and no network connection."""
     report = Reporter("<text>", data, limits)
     read_urdf(report)
@@ -139,7 +145,7 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
     """Parse and check the file of `report`; return None if the file is not a URDF."""
     root = read_document(report)
-    read_comments(report, CODES)
+    apply_comments(report, CODE_BY_NAME)
     robot = None if root is None else read_robot(report, root)
     if root is None or robot is None:
         return None
@@ -147,11 +153,11 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     check_prefixes(report, root)
     check_vocabulary(report, root)
     check_names(report, robot, root_joint)
-    sound = check_structure(report, robot)
+    is_tree = check_structure(report, robot)
     check_axes(report, robot)
     check_ranges(report, robot)
     check_mimic(report, robot, enabled=mimic)
-    check_suspicious(report, robot, sound=sound)
+    check_suspicious(report, robot, is_tree=is_tree)
     check_inertials(report, robot)
     check_shapes(report, robot)
     check_materials(report, robot)

@@ -34,8 +34,8 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.lint.pages import find_rules
 from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
-from urdfkin.urdf.lint.runner import Examined, file_of
-from urdfkin.urdf.sources import Text, as_word, is_xacro
+from urdfkin.urdf.lint.runner import Examination, find_local_path
+from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
 #: Version of the baseline format. The number changes if a field is removed or gets another meaning.
 BASELINE_VERSION = 1
@@ -53,28 +53,28 @@ def key_of(finding: Finding, file: str) -> Key:
 class Baseline:
     """Numbers of known findings, by key; file names in the keys are relative to `root`.
 
-    If this run encounters a known finding, the number in `counts` decreases and `met` increases.
+    If this run encounters a known finding, the number in `counts` decreases and `match_count` increases.
     """
 
     counts: Counter[Key]
     root: Path = field(default_factory=Path)
-    met: int = 0
+    match_count: int = 0
 
-    def knows(self, finding: Finding) -> bool:
-        key = key_of(finding, relative(finding.file, self.root))
+    def consume(self, finding: Finding) -> bool:
+        key = key_of(finding, relative_path(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
         self.counts[key] -= 1
-        self.met += 1
+        self.match_count += 1
         return True
 
-    def gone(self, files: Iterable[str]) -> int:
+    def count_unmatched(self, files: Iterable[str]) -> int:
         """Return the number of known findings in `files` that this run has not encountered."""
-        checked = {relative(file, self.root) for file in files}
+        checked = {relative_path(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
 
-def relative(file: str, root: Path) -> str:
+def relative_path(file: str, root: Path) -> str:
     if file.startswith("<"):
         return file
     path = os.path.relpath(Path(file.removesuffix(" (expanded)")).resolve(), root.resolve())
@@ -102,9 +102,9 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     If there is an older baseline at `path`, copy some of its entries: those about files that exist and are
     not in `files`.
     """
-    counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
+    counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
-        checked = {relative(file, path.parent) for file in files}
+        checked = {relative_path(file, path.parent) for file in files}
         older = read_baseline(path).counts
         others = [key for key in older if key[0] not in checked and (path.parent / key[0]).exists()]
         counts |= Counter({key: older[key] for key in others})
@@ -113,11 +113,11 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     return json.dumps(document, indent=1) + "\n"
 
 
-_KINDS = {
+_SETTING_TYPES = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
 }  # fmt: skip
-_WORDS = {
+_TYPE_NAMES = {
     list: "a list of strings",
     dict: "a table of lists of strings",
     bool: "true or false",
@@ -125,7 +125,7 @@ _WORDS = {
 }
 
 #: Default patterns of robot files, without .xacro, because most .xacro files describe only a part of a robot.
-INCLUDE = ("*.urdf",)
+DEFAULT_INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +139,10 @@ class Settings:
     def root(self) -> Path:
         return Path() if self.file is None else self.file.parent
 
-    def ignored_in(self, file: str) -> frozenset[str]:
+    def ignored_codes(self, file: str) -> frozenset[str]:
         table = self.values.get("per-file-ignores", {})
         patterns = [pattern for pattern in table if matches(file, [pattern], self.root)]
-        return codes(word for pattern in patterns for word in table[pattern])
+        return find_codes(word for pattern in patterns for word in table[pattern])
 
 
 def find_settings(start: Path) -> Settings:
@@ -152,7 +152,7 @@ def find_settings(start: Path) -> Settings:
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
-        if exists(file) and (found := _table(file)) is not None:
+        if exists(file) and (found := _read_table(file)) is not None:
             return _check_settings(file, found)
         if exists(folder / ".git"):
             break
@@ -160,13 +160,13 @@ def find_settings(start: Path) -> Settings:
 
 
 def read_settings(file: Path) -> Settings:
-    if (found := _table(file, pipes=True)) is None:
+    if (found := _read_table(file, pipes=True)) is None:
         remedy = "add this table, or omit --config"
         raise InputError("no table [tool.urdfkin]", where=str(file), remedy=remedy)
     return _check_settings(file, found)
 
 
-def _table(file: Path, *, pipes: bool = False) -> Any:
+def _read_table(file: Path, *, pipes: bool = False) -> Any:
     try:
         return tomllib.loads(read_text(file, pipes=pipes)).get("tool", {}).get("urdfkin")
     except (tomllib.TOMLDecodeError, AttributeError, RecursionError) as error:
@@ -178,17 +178,17 @@ def _check_settings(file: Path, table: Any) -> Settings:
     if not isinstance(table, dict):
         raise InputError("this setting is not a table", where=where, found=repr(table))
     for name, value in table.items():
-        if name not in _KINDS:
-            raise UnknownNameError("setting", name, _KINDS, where=where)
-        kind = _KINDS[name]
+        if name not in _SETTING_TYPES:
+            raise UnknownNameError("setting", name, _SETTING_TYPES, where=where)
+        kind = _SETTING_TYPES[name]
         lists = [value] if kind is list else []
         if kind is dict and isinstance(value, dict):
             lists = [*value.values()]
         if not isinstance(value, kind) or not all(_is_list_of_strings(each) for each in lists):
-            raise InputError(f"{name} must be {_WORDS[kind]}", where=where, found=repr(value))
+            raise InputError(f"{name} must be {_TYPE_NAMES[kind]}", where=where, found=repr(value))
         if name in ("select", "ignore", "per-file-ignores"):
             try:
-                codes(word for each in lists for word in each)
+                find_codes(word for each in lists for word in each)
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
     if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
@@ -201,7 +201,7 @@ def _is_list_of_strings(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 
-def codes(words: Iterable[str]) -> frozenset[str]:
+def find_codes(words: Iterable[str]) -> frozenset[str]:
     return frozenset(rule.id for word in words for rule in find_rules(word))
 
 
@@ -214,95 +214,106 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     >>> matches("robots/old/arm.urdf", ["old"], Path()), matches("robots/arm.urdf", ["robots/o*"], Path())
     (True, False)
     """
-    path = PurePosixPath(relative(file, root))
-    ways = [str(path), *(str(above) for above in path.parents)]
+    path = PurePosixPath(relative_path(file, root))
+    paths = [str(path), *(str(above) for above in path.parents)]
     return any(
-        any(fnmatchcase(part, pattern) for part in (path.parts if "/" not in pattern else ways))
+        any(fnmatchcase(part, pattern) for part in (path.parts if "/" not in pattern else paths))
         for pattern in (pattern.removeprefix("**/").rstrip("/") for pattern in patterns)
     )
 
 
 #: Suffixes of files that a xacro file can include.
-_PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
+_INCLUDABLE_SUFFIXES = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class FindingFilter:
     codes: frozenset[str]
     notes: bool = True
     settings: Settings = field(default_factory=Settings)
     baseline: Baseline | None = None
 
-    def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
+    def make_predicate(
+        self, text: UrdfText, older_findings: Baseline | None = None
+    ) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
         Call the returned function once for each finding, in file order, because it counts known findings.
         """
-        codes = self.codes - self.settings.ignored_in(text.label)
-        known = [baseline for baseline in (self.baseline, before) if baseline is not None]
+        codes = self.codes - self.settings.ignored_codes(text.label)
+        known = [baseline for baseline in (self.baseline, older_findings) if baseline is not None]
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
             # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
-            return selected and not sum(baseline.knows(finding) for baseline in known)
+            return selected and not sum(baseline.consume(finding) for baseline in known)
 
         return is_reported
 
-    def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Call `of` with copies of the baselines, so that the original baselines do not change."""
-        copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
-        return replace(self, baseline=copies[0]).of(text, copies[1])
+    def make_independent_predicate(
+        self, text: UrdfText, older_findings: Baseline | None = None
+    ) -> Callable[[Finding], bool]:
+        """Call `make_predicate` with copies of the baselines, so that the originals do not change."""
+        copies = [
+            known and replace(known, counts=Counter(known.counts))
+            for known in (self.baseline, older_findings)
+        ]
+        return replace(self, baseline=copies[0]).make_predicate(text, copies[1])
 
 
-def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
+def find_known_findings(
+    text: UrdfText, version: Version, examine: Callable[[UrdfText], Examination]
+) -> Baseline | None:
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
     An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
     that it could include has changed. Findings about missing meshes are new if the text contains the name of
     a file that was deleted since the older version.
     """
-    path = Path(text.source) if is_xacro(text.source) else file_of(text)
+    path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
         # every finding is new.
-        return Baseline(Counter()) if version.changed(_PARTS) else None
-    same = version.holds(text.data)
-    old = text.data if same else version.read(path)
-    found = () if old is None else look(replace(text, data=old)).findings
+        return Baseline(Counter()) if version.changed(_INCLUDABLE_SUFFIXES) else None
+    is_unchanged = version.holds(text.data)
+    old_data = text.data if is_unchanged else version.read(path)
+    findings = () if old_data is None else examine(replace(text, data=old_data)).findings
     if any(os.fsencode(name) in text.data for name in version.gone):
-        found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
-    elif same:
+        findings = tuple(finding for finding in findings if finding.code != MESH_MISSING.id)
+    elif is_unchanged:
         return None
-    return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
+    return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
 
 
 #: ROS's build tools and urdfkin skip a folder that contains a file with one of these names.
-LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
-def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the sorted files that `word` names; raise SourceError if there is none."""
-    path = Path(word)
-    if word == "-" or word in catalogue():
-        return [word]
+def find_files(
+    argument: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]
+) -> list[str]:
+    """Return the sorted files that `argument` names; raise SourceError if there is none."""
+    path = Path(argument)
+    if argument == "-" or argument in catalogue():
+        return [argument]
     if is_folder(path):
-        found = sorted(_below(path, settings.root, include, exclude))
+        files = sorted(_walk_folder(path, settings.root, include, exclude))
         remedy = f"searched for {', '.join(include)}, except in hidden and excluded folders"
-    elif glob.has_magic(word) and not exists(path):
-        found = [file for file in _matching(word) if not matches(file, exclude, settings.root)]
+    elif glob.has_magic(argument) and not exists(path):
+        files = [file for file in _expand_pattern(argument) if not matches(file, exclude, settings.root)]
         remedy = None
     else:
-        return [f"./{word}" if word.lstrip().startswith("<") else word]
-    if not found:
-        raise SourceError("no URDF found", where=word, remedy=remedy)
-    return found
+        return [f"./{argument}" if argument.lstrip().startswith("<") else argument]
+    if not files:
+        raise SourceError("no URDF found", where=argument, remedy=remedy)
+    return files
 
 
-def _below(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[str]) -> Iterator[str]:
+def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[str]) -> Iterator[str]:
     for here, folders, files in os.walk(folder):
-        if any(name in LEFT_ALONE for name in files):
+        if any(name in IGNORE_MARKERS for name in files):
             folders.clear()
             continue
         place = Path(here)
@@ -312,10 +323,10 @@ def _below(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[s
             if not name.startswith(".") and not matches(str(place / name), exclude, root)
         ]
         named = (place / name for name in files if any(fnmatchcase(name, pattern) for pattern in include))
-        yield from (as_word(file) for file in named if not matches(str(file), exclude, root))
+        yield from (unambiguous_path(file) for file in named if not matches(str(file), exclude, root))
 
 
-def _matching(pattern: str) -> list[str]:
+def _expand_pattern(pattern: str) -> list[str]:
     # Path.glob accepts neither absolute patterns nor "..".
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
-    return sorted(as_word(name) for name in names if not is_folder(name))
+    return sorted(unambiguous_path(name) for name in names if not is_folder(name))

@@ -17,12 +17,12 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_str, whole_number
-from urdfkin.kinematics.inputs import floats
+from urdfkin.kinematics.inputs import as_floats
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration import parse_finite
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, frozen
+from urdfkin.model.tree import FloatArray, freeze
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import ends, enough_digits, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
@@ -78,7 +78,7 @@ class Enclosure:
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
 
     def _alike(self, x: ArrayLike) -> FloatArray:
-        x = floats(x, f"the {self.quantity}")
+        x = as_floats(x, f"the {self.quantity}")
         if x.shape != self.lower.shape:
             raise InputError(f"the {self.quantity} has the shape {self.lower.shape}", found=f"{x.shape}")
         return x
@@ -125,7 +125,7 @@ class Enclosures:
 def enclose(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
-    inputs: tuple[Given, Given, Given],
+    inputs: tuple[ConfigurationLike, ConfigurationLike, ConfigurationLike],
     frame: str,
     reference: Reference | str,
     base: BaseMotion | None,
@@ -145,7 +145,7 @@ def enclose(
             remedy="give q (nq,), v and a (nv,), and the base of one sample",
         )
     for x, name in zip(inputs, "qva", strict=True):
-        checked(tree, x, name)
+        parse_finite(tree, x, name)
     link, part = call.links[0], call.part(slice(0, 1))
     path = tree.path(link)
     digits = digits or enough_digits(len(path))
@@ -161,8 +161,8 @@ def enclose(
     oracle = None if verifier.cannot(base) else verifier.oracle(base)
 
     def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
-        ours = frozen(own_results(row, part)[0, 0])
-        theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.query)[0, 0])
-        return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
+        ours = freeze(own_results(row, part)[0, 0])
+        theirs = None if oracle is None else freeze(oracle_results(row, oracle, part.query)[0, 0])
+        return Enclosure(row.name, freeze(lower), freeze(upper), ours, theirs)
 
     return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))

@@ -295,7 +295,7 @@ class _ExactText:
         at |= {joint.name: joint.lock.q for joint in tree.joints if joint.lock and not joint.lock.joint.mimic}
         angles, rules, lengths, step = np.zeros(len(q)), 0, [0.0], 0
         for i in path:
-            joint, unlocked = tree.joints[i], tree.joints[i].unlocked
+            joint, unlocked = tree.joints[i], tree.joints[i].original
             if (element := self.elements.get(joint.name)) is not None:
                 origin = element.find("origin")
                 if not self.has_quaternion(origin):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.kinematics import equations
-from urdfkin.model.recursion import IDENTITY, Column, Number, Recursion, State, Vector
+from urdfkin.model.recursion import IDENTITY, Column, LinkState, Number, Recursion, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.verify.exact.numbers import (
@@ -37,7 +37,7 @@ _FREE_AXES = {
 }
 
 
-def on_base(base: BaseNumbers) -> State:
+def on_base(base: BaseNumbers) -> LinkState:
     """Return the base's motion as the position, velocity and acceleration of the root link.
 
     The base's rotation matrix is replaced by the nearest rotation.
@@ -48,14 +48,14 @@ def on_base(base: BaseNumbers) -> State:
 
     T, six, six_2 = base.placement, base.velocity, base.acceleration
     R = nearest_rotation((vector(T[0]), vector(T[1]), vector(T[2])))
-    return State(R, *map(vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
+    return LinkState(R, *map(vector, (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])))
 
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
     """Position, velocity, acceleration and Jacobian columns of each link in one sample, by link index."""
 
-    states: Mapping[int, State]
+    states: Mapping[int, LinkState]
     columns: Mapping[int, tuple[Column, ...]]
     nv: int
 
@@ -67,7 +67,7 @@ def move(
     v: Iterable[Number],
     a: Iterable[Number],
     *,
-    base: State | None = None,
+    base: LinkState | None = None,
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
@@ -75,30 +75,32 @@ def move(
     joint.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
-    states = {0: base or State()}
+    states = {0: base or LinkState()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, exact_joint in joints.items():
         joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
-        placed = _RECURSION.turned(_RECURSION.carried(states[joint.parent], exact_joint.p), exact_joint.R)
+        placed = _RECURSION.rotate_frame(
+            _RECURSION.translate_frame(states[joint.parent], exact_joint.p), exact_joint.R
+        )
         kind, new = joint.kind, tuple[Column, ...]()
         if kind.has_axis:
             axis, multiplier = exact_joint.axis, exact_joint.multiplier
             coordinate = multiplier * q[at] + exact_joint.offset
             rates = multiplier * v[rate_at], multiplier * a[rate_at]
-            z = _RECURSION.seen(placed, axis)
+            z = _RECURSION.express(placed, axis)
             if kind.turns:
-                moved = _RECURSION.revolute(placed, axis, about(axis, coordinate), *rates)
+                moved = _RECURSION.after_revolute(placed, axis, about(axis, coordinate), *rates)
             else:
-                moved = _RECURSION.prismatic(placed, axis, coordinate, *rates)
+                moved = _RECURSION.after_prismatic(placed, axis, coordinate, *rates)
             new = (Column(z, kind.turns, moved, i, rate_at, multiplier),)
         elif kind is JointKind.FIXED:
             moved = placed
         elif kind is JointKind.PLANAR:
             S = about(IDENTITY[2], q[at + 2])
-            moved = _RECURSION.planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
+            moved = _RECURSION.after_planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
         elif kind is JointKind.FLOATING:
             S = from_quaternion(q[at + 3 : at + 7])
-            moved = _RECURSION.floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
+            moved = _RECURSION.after_floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
         else:
             raise NotImplementedError(f"the motion of a {kind} joint")
         if kind in _FREE_AXES:

@@ -68,7 +68,7 @@ CASES = [
     # Mimic joints.
     Case("mimic-unknown", arm(follow='<mimic joint="j9"/>'), REJECT, "URDF520:7"),
     Case("mimic-a-link", arm(follow='<mimic joint="l1"/>'), REJECT, "URDF520:7"),
-    Case("mimic-circle", arm(inside='<mimic joint="j2"/>', follow=_MIMIC), REJECT, "URDF521:6 URDF521:7"),
+    Case("mimic-cycle", arm(inside='<mimic joint="j2"/>', follow=_MIMIC), REJECT, "URDF521:6 URDF521:7"),
     Case("mimic-planar-leader", arm(attributes='type="planar"', follow=_MIMIC), REJECT, "URDF522:7"),
     Case("mimic-floating-leader", arm(attributes='type="floating"', follow=_MIMIC), REJECT, "URDF522:7"),
     Case("mimic-planar-follower", arm(second='type="planar"', follow=_MIMIC), REJECT, "URDF522:7"),

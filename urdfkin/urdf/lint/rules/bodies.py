@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from urdfkin.urdf.catalogue import find_package, split_uri
-from urdfkin.urdf.findings import ERROR, WARNING, Reporter, Rule, quoted
+from urdfkin.urdf.findings import ERROR, WARNING, Reporter, Rule, quote
 from urdfkin.urdf.parser import NumberReader
 from urdfkin.urdf.records import Element, RobotRecord
 
@@ -16,17 +16,17 @@ INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
 #: Largest mass (kg) and largest coordinate (m) of a centre of mass that are not reported.
-HEAVIEST, FARTHEST = 1e9, 1e6
+MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
 #: A mass (kg) below this number is probably a placeholder. The moments of inertia are then not checked.
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE_MASS = 1e-3
 
 #: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
 #: Only bodies smaller than about 0.03 mm have such small moments.
-ROUNDING = 1e-9
+NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of moments of inertia, which exporters write with few digits.
-_WRITTEN = 1e-6
+_MOMENT_PRECISION = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -34,14 +34,14 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
     numbers = NumberReader(report, UNREADABLE, UNREADABLE)
     for link in robot.links.values():
-        inertial = link.first("inertial")
+        inertial = link.find("inertial")
         if inertial is not None:
             _check_inertial(report, inertial, numbers)
 
 
 def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) -> None:
-    origin, mass_element, tensor = (inertial.first(tag) for tag in ("origin", "mass", "inertia"))
-    missing = [f"<{tag}>" for tag in ("mass", "inertia") if inertial.first(tag) is None]
+    origin, mass_element, tensor = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
+    missing = [f"<{tag}>" for tag in ("mass", "inertia") if inertial.find(tag) is None]
     if mass_element is not None and "value" not in mass_element.attributes:
         missing.append("value of <mass>")
     if tensor is not None:
@@ -52,12 +52,12 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
         report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
     lever = None
     if origin is not None:
-        lever = numbers.vector(origin, "xyz")
-        numbers.vector(origin, "rpy")
-    mass = None if mass_element is None else numbers.scalar(mass_element, "value")
+        lever = numbers.read_vector(origin, "xyz")
+        numbers.read_vector(origin, "rpy")
+    mass = None if mass_element is None else numbers.read_scalar(mass_element, "value")
     _check_mass(report, inertial, mass, lever)
     if tensor is not None:
-        read = (numbers.scalar(tensor, name) for name in _MOMENTS)
+        read = (numbers.read_scalar(tensor, name) for name in _MOMENTS)
         moments = [moment for moment in read if moment is not None]
         if len(moments) == len(_MOMENTS):
             _check_moments(report, tensor, moments, mass)
@@ -70,15 +70,15 @@ def _check_mass(
         report.add(
             INERTIAL_IMPOSSIBLE,
             "the mass is negative",
-            inertial.first("mass"),
+            inertial.find("mass"),
             attribute="value",
             found=f"{mass:g}",
             remedy="write the mass in kilograms",
             weight=1.0,
         )
-    heavy = mass is not None and abs(mass) > HEAVIEST
+    heavy = mass is not None and abs(mass) > MAX_MASS
     distance = max(map(abs, lever or (0.0,)))
-    if heavy or distance > FARTHEST:
+    if heavy or distance > MAX_COORDINATE:
         message = "the mass or the centre of mass is far too large"
         remedy = "write the mass in kilograms and the centre of mass in metres"
         found = f"mass {mass:g} kg" if heavy else f"centre of mass {distance:g} m away"
@@ -91,10 +91,10 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         remedy = "write the mass in kilograms, or remove the moments"
         report.add(INERTIAL_IMPOSSIBLE, "the body has moments of inertia, but no mass", tensor, remedy=remedy)
         return
-    if 0.0 < kilograms < NEGLIGIBLE:
+    if 0.0 < kilograms < NEGLIGIBLE_MASS:
         return
     small, middle, large = principal_moments(moments)
-    slack = _WRITTEN * max(abs(small), abs(large)) + ROUNDING * kilograms
+    slack = _MOMENT_PRECISION * max(abs(small), abs(large)) + NEGLIGIBLE_MOMENT * kilograms
     if small < -slack:
         what, found = "a principal moment of inertia is negative", f"{small:.3g}"
     elif large > middle + small + slack:
@@ -150,14 +150,15 @@ def check_shapes(report: Reporter, robot: RobotRecord) -> None:
 def _check_geometry(
     report: Reporter, owner: Element, numbers: NumberReader, version: tuple[int, int]
 ) -> None:
-    origin, geometry = owner.first("origin"), owner.first("geometry")
+    origin, geometry = owner.find("origin"), owner.find("geometry")
     if origin is not None:
-        numbers.vector(origin, "xyz")
-        numbers.vector(origin, "rpy")
-    capsule = None if geometry is None else geometry.first("capsule")
+        numbers.read_vector(origin, "xyz")
+        numbers.read_vector(origin, "rpy")
+    capsule = None if geometry is None else geometry.find("capsule")
     if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
-        report.add(GEOMETRY, message, capsule, remedy="use a cylinder and two spheres")
+        remedy = 'write version="1.1" in <robot>, or use a cylinder and two spheres'
+        report.add(GEOMETRY, message, capsule, remedy=remedy)
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
@@ -172,18 +173,18 @@ def _check_geometry(
     for attribute, count, required in _SHAPES[shape.tag]:
         if attribute not in shape.attributes:
             if required:
-                _missing(report, owner, shape, attribute)
+                _report_missing(report, owner, shape, attribute)
         elif count == 1:
-            numbers.scalar(shape, attribute)
+            numbers.read_scalar(shape, attribute)
         else:
-            numbers.vector(shape, attribute, count)
+            numbers.read_vector(shape, attribute, count)
     if shape.tag == "mesh" and not shape.attributes.get("filename", "").strip():
-        _missing(report, owner, shape, "filename")
+        _report_missing(report, owner, shape, "filename")
     elif shape.tag == "mesh":
         check_address(report, shape)
 
 
-def _missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
+def _report_missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
     message = f"the {shape.tag} of a {owner.tag} has no {attribute}"
     report.add(GEOMETRY, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
 
@@ -193,41 +194,44 @@ MATERIAL_TWICE = Rule("URDF709", "material-twice", ERROR)
 
 
 def check_materials(report: Reporter, robot: RobotRecord) -> None:
-    defined = _materials(report, robot)
+    defined = _find_defined_materials(report, robot)
     for link in robot.links.values():
-        for visual in link.all("visual"):
+        for visual in link.find_all("visual"):
             _check_material(report, visual, defined)
 
 
-def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
+def _find_defined_materials(report: Reporter, robot: RobotRecord) -> set[str]:
     defined: dict[str, Element] = {}
-    for material in robot.element.all("material"):
+    for material in robot.element.find_all("material"):
         name = material.attributes.get("name", "")
         if name in defined:
-            message = "another material of the robot has this name; urdfdom refuses the file"
+            what, found = "two materials of the robot have no name", None
+            if name:
+                what, found = "another material of the robot has this name", quote(name)
+            message = f"{what}; urdfdom refuses the file"
             remedy = f"the first is on line {defined[name].line}; remove one of these materials"
-            report.add(MATERIAL_TWICE, message, material, attribute="name", found=quoted(name), remedy=remedy)
+            report.add(MATERIAL_TWICE, message, material, attribute="name", found=found, remedy=remedy)
         defined.setdefault(name, material)
     inside = {
         material.attributes.get("name", "")
         for link in robot.links.values()
-        for visual in link.all("visual")
-        for material in visual.all("material")
-        if material.first("color") is not None or material.first("texture") is not None
+        for visual in link.find_all("visual")
+        for material in visual.find_all("material")
+        if material.find("color") is not None or material.find("texture") is not None
     }
     return set(defined) | inside
 
 
 def _check_material(report: Reporter, visual: Element, defined: set[str]) -> None:
-    material = visual.first("material")
+    material = visual.find("material")
     if material is None:
         return
     name = material.attributes.get("name")
-    anonymous = name is None or (not name and (material.first("color") or material.first("texture")))
+    anonymous = name is None or (not name and (material.find("color") or material.find("texture")))
     if name is None or (name not in defined and not anonymous):
         message = "the material has no name" if name is None else "the material is not defined"
         remedy = 'write <material name="..."> with a <color>'
-        found = None if name is None else quoted(name)
+        found = None if name is None else quote(name)
         report.add(MATERIAL_UNKNOWN, message, material, attribute="name", found=found, remedy=remedy)
 
 
@@ -235,38 +239,39 @@ MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
 MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
-def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
+def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> None:
     """Report missing meshes and packages.
 
-    `beside` is the path of the URDF file. If `beside` is None, only `package://` and `model://` meshes are
-    checked.
+    `urdf_path` is the path of the URDF file. If `urdf_path` is None, only `package://` and `model://` meshes
+    are checked.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
-    for mesh in _meshes(root):
+    for mesh in _find_meshes(root):
         filename = mesh.attributes.get("filename", "").strip()
         parts = split_uri(filename)
         if parts is not None:
             package, path = parts
             if package not in packages:
-                packages[package] = find_package(package, beside)
+                packages[package] = find_package(package, urdf_path)
             folder = packages[package]
             if folder is None:
                 missing.setdefault(package, []).append(mesh)
             elif not _exists(folder / path):
                 _report_file(report, mesh, filename)
-        elif _is_missing_file(filename, beside):
+        elif _is_missing_file(filename, urdf_path):
             _report_file(report, mesh, filename)
     for package, meshes in missing.items():
+        remedy = "add the package's folder to ROS_PACKAGE_PATH" if package else "write package://NAME/PATH"
         report.add(
             MESH_MISSING,
-            f"package {quoted(package)} of {_count(len(meshes))} is not found"
+            f"package {quote(package)} of {_count(len(meshes))} is not found"
             if package
             else f"the address of {_count(len(meshes))} names no package",
             meshes[0],
             attribute="filename",
-            found=quoted(meshes[0].attributes["filename"]),
-            remedy="add the package's folder to ROS_PACKAGE_PATH; kinematics needs no mesh",
+            found=quote(meshes[0].attributes["filename"]),
+            remedy=f"{remedy}; kinematics needs no mesh",
         )
 
 
@@ -275,22 +280,22 @@ def check_address(report: Reporter, mesh: Element) -> None:
     if filename.lower().startswith(("http:", "https:", "ftp:")):
         message = "the mesh is on the network and was not downloaded"
         remedy = "copy the mesh into a package"
-        report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
+        report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 
-def _meshes(root: Element) -> Iterator[Element]:
-    for link in root.all("link"):
+def _find_meshes(root: Element) -> Iterator[Element]:
+    for link in root.find_all("link"):
         for shape in link.children:
-            geometry = shape.first("geometry") if shape.tag in ("visual", "collision") else None
+            geometry = shape.find("geometry") if shape.tag in ("visual", "collision") else None
             if geometry is not None:
-                yield from geometry.all("mesh")
+                yield from geometry.find_all("mesh")
 
 
-def _is_missing_file(filename: str, beside: Path | None) -> bool:
+def _is_missing_file(filename: str, urdf_path: Path | None) -> bool:
     local = filename and ("://" not in filename or filename.startswith("file://"))
-    if beside is None or not local:
+    if urdf_path is None or not local:
         return False
-    return not _exists(beside.absolute().parent / filename.removeprefix("file://"))
+    return not _exists(urdf_path.absolute().parent / filename.removeprefix("file://"))
 
 
 def _exists(path: Path) -> bool:
@@ -302,8 +307,8 @@ def _exists(path: Path) -> bool:
 
 def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
     message = "the mesh is not found"
-    remedy = "kinematics needs no mesh"
-    report.add(MESH_MISSING, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
+    remedy = "correct the filename, or add the file; kinematics needs no mesh"
+    report.add(MESH_MISSING, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 
 def _count(number: int) -> str:

@@ -16,13 +16,13 @@ from urdfkin.urdf.findings import (
     NOTE,
     WARNING,
     Comment,
+    CommentIndex,
+    IgnoreComment,
     Reporter,
     Rule,
     Severity,
-    Silence,
-    Silences,
-    quoted,
-    shortened,
+    quote,
+    shorten,
 )
 from urdfkin.urdf.parser import JOINT_TYPES, nearest_tag
 from urdfkin.urdf.records import Element, RobotRecord
@@ -50,7 +50,7 @@ def check_dialect(report: Reporter, root: Element) -> None:
         report.add(
             ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give the robot a name"
         )
-    if not root.all("link"):
+    if not root.find_all("link"):
         srdf = any(child.tag in _SRDF for child in root.children)
         remedy = "this is an SRDF; pass the URDF of the robot" if srdf else "a robot has at least one <link>"
         report.add(NO_LINKS, "the robot has no link", root, remedy=remedy)
@@ -58,8 +58,8 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
-        message = "xmlns puts the elements into a namespace, so most readers do not find the elements"
-        found = quoted(root.attributes["xmlns"])
+        message = "xmlns puts the elements into a namespace; readers that support namespaces find no links"
+        found = quote(root.attributes["xmlns"])
         report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
         key.removeprefix("xmlns:"): value
@@ -68,37 +68,39 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         if key.startswith("xmlns:")
     }
     xacro = {prefix for prefix, uri in namespaces.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
-    macros: list[_Place] = []
+    macros: list[_Occurrence] = []
     for element in root.walk():
         prefix, _, local = element.tag.rpartition(":")
         if prefix in xacro:
             macros.append((element, None))
         elif (local == "include" and namespaces.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
             remedy = "insert the content of the other file here; urdfkin did not open it"
-            found = quoted(element.attributes.get("href", f"<{element.tag}>"))
+            found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
     # Kinematics uses a macro only if the macro is directly inside <robot> or inside a joint.
-    if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
+    if _report_xacro(
+        report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
+    ):
         return
-    expressions: list[_Place] = [
+    expressions: list[_Occurrence] = [
         (element, key)
-        for element in outside_extensions(root)
+        for element in walk_outside_extensions(root)
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
     _report_xacro(report, "xacro expression", expressions, _is_used)
 
 
-_EXPAND = (
+_EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_remedy('xacro')} and pass the .xacro file"
 )
 
 #: An element, and the name of one of its attributes or None.
-_Place = tuple[Element, str | None]
+_Occurrence = tuple[Element, str | None]
 
 
 def _report_xacro(
-    report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
+    report: Reporter, what: str, places: Sequence[_Occurrence], is_used: Callable[[Element], bool]
 ) -> bool:
     """Report the unexpanded xacro at `places`; return whether kinematics uses any of these elements."""
     used = [place for place in places if is_used(place[0])]
@@ -110,19 +112,21 @@ def _report_xacro(
         if not group:
             continue
         element, key = group[0]
-        found = f"<{shortened(element.tag)}>"
+        found = f"<{shorten(element.tag)}>"
         if key is not None:
-            found = f"{shortened(key)}={quoted(element.attributes[key])}"
-        found += _more(group)
-        report.add(XACRO, message, element, attribute=key, found=found, remedy=_EXPAND, severity=severity)
+            found = f"{shorten(key)}={quote(element.attributes[key])}"
+        found += _count_more(group)
+        report.add(
+            XACRO, message, element, attribute=key, found=found, remedy=_EXPAND_REMEDY, severity=severity
+        )
     return bool(used)
 
 
 def _is_used(element: Element) -> bool:
-    return element.holder.tag == "joint" or (element.holder is element and element.tag == "link")
+    return element.top_element.tag == "joint" or (element.top_element is element and element.tag == "link")
 
 
-def _more(group: Sequence[object]) -> str:
+def _count_more(group: Sequence[object]) -> str:
     return f" and {len(group) - 1} more" if len(group) > 1 else ""
 
 
@@ -141,16 +145,16 @@ STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
 #: Elements and attributes of simulators and vendors that are common in URDF files.
-_COMMON = (
+_COMMON_EXTENSIONS = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
-EXTENSIONS = frozenset(_COMMON.split())
+EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: If a line has no colon, the attributes of the element are not checked.
 #: If an element has no line, its content is not checked.
-_TABLE = """
+_VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
 joint: name type > origin parent child axis limit mimic dynamics safety_controller calibration
@@ -168,28 +172,28 @@ mimic: joint multiplier offset >
 dynamics: damping friction >
 safety_controller: k_velocity k_position soft_lower_limit soft_upper_limit >
 """
-_LINES = [line.partition(">") for line in _TABLE.strip().splitlines()]
-CHILDREN = {head.split()[0].rstrip(":"): frozenset(inside.split()) for head, _, inside in _LINES}
+_VOCABULARY_LINES = [line.partition(">") for line in _VOCABULARY.strip().splitlines()]
+CHILDREN = {head.split()[0].rstrip(":"): frozenset(inside.split()) for head, _, inside in _VOCABULARY_LINES}
 ATTRIBUTES = {
     tag: frozenset(names.split())
-    for tag, colon, names in (head.partition(":") for head, *_ in _LINES)
+    for tag, colon, names in (head.partition(":") for head, *_ in _VOCABULARY_LINES)
     if colon
 }
 
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
-_FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
+_POSE_NAMES_ELSEWHERE = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Attributes that `--fix` does not remove, because other elements or formats define them.
-_MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
+_DEFINED_ELSEWHERE = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_ELSEWHERE | EXTENSIONS
 
 #: Child elements that may occur only once in an element, by the tag of the element.
-_ONCE = {
+_SINGLE_CHILDREN = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
 #: Elements in which text between the tags is reported.
-_VALUES = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
+_ELEMENTS_WITHOUT_TEXT = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
 #: Elements in which text between the tags is probably a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
@@ -212,9 +216,9 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
 
 
 def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
-    parts = [part for part in outside_extensions(element) if _is_part(part)]
+    parts = [part for part in walk_outside_extensions(element) if _is_link_or_joint(part)]
     for part in parts:
-        meant = nearest_tag(part.tag, _PARTS)
+        meant = nearest_tag(part.tag, _LINK_OR_JOINT)
         what = f"<{part.tag}>"
         if part.tag == meant:
             what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
@@ -226,19 +230,21 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
     parent = element.parent
     if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
-        message, found = f"the value inside <{element.tag}> is skipped", quoted(element.text)
+        message, found = f"the value inside <{element.tag}> is skipped", quote(element.text)
         remedy = f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}"
         report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=Severity.ERROR)
         return
     message = f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; the element is skipped"
     remedy = f"did you mean <{close}>?" if close else "remove the element"
-    if element.tag in _FOREIGN:
+    if element.tag in _POSE_NAMES_ELSEWHERE:
         remedy = f"write {_EXAMPLES['origin']}"
+    elif element.tag in EXTENSIONS:
+        remedy = "keep the element if another program needs it"
     severity = Severity.NOTE if element.tag in EXTENSIONS else None
     report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
 
-def outside_extensions(element: Element) -> Iterator[Element]:
+def walk_outside_extensions(element: Element) -> Iterator[Element]:
     """Yield an element and its descendants, except extension elements and their content."""
     stack = [element]
     while stack:
@@ -247,20 +253,20 @@ def outside_extensions(element: Element) -> Iterator[Element]:
         stack += [child for child in reversed(element.children) if child.tag not in OPAQUE]
 
 
-def _is_part(element: Element) -> bool:
+def _is_link_or_joint(element: Element) -> bool:
     """Return whether an element is probably a link or joint."""
-    tag = nearest_tag(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
+    tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MAX_TAG_LENGTH else None
     if tag == "link":
         return "name" in element.attributes
     return tag == "joint" and (
-        element.attributes.get("type", "").lower() in JOINT_TYPES or element.first("parent") is not None
+        element.attributes.get("type", "").lower() in JOINT_TYPES or element.find("parent") is not None
     )
 
 
-_PARTS = frozenset({"link", "joint"})
+_LINK_OR_JOINT = frozenset({"link", "joint"})
 
 #: A tag with at least this number of characters is not similar to `link` or `joint`.
-_LONGEST_PART = 8
+_MAX_TAG_LENGTH = 8
 
 
 def _check_attributes(report: Reporter, element: Element) -> None:
@@ -277,21 +283,23 @@ def _check_attributes(report: Reporter, element: Element) -> None:
             f"<{element.tag}> has no attribute of this name; the attribute is skipped",
             element,
             attribute=attribute,
-            found=f"{attribute}={quoted(element.attributes[attribute])}",
+            found=f"{attribute}={quote(element.attributes[attribute])}",
             remedy=f"did you mean {close}?" if close else every,
             severity=Severity.NOTE if attribute in EXTENSIONS else None,
-            fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
+            fix=None
+            if close or attribute in _DEFINED_ELSEWHERE
+            else partial(report.make_removal_fix, element, attribute),
         )
 
 
 def _check_text(report: Reporter, element: Element) -> None:
-    if not element.text or element.tag not in _VALUES:
+    if not element.text or element.tag not in _ELEMENTS_WITHOUT_TEXT:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
         return  # Another finding already quotes this text.
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
-    message, found = f"text inside <{element.tag}> is skipped", quoted(element.text)
+    message, found = f"text inside <{element.tag}> is skipped", quote(element.text)
     remedy = f"write the value as an attribute, as in {example}" if example else "remove the text"
     severity = Severity.ERROR if lost else None
     report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=severity)
@@ -308,7 +316,7 @@ _EXAMPLES = {
 
 
 def _check_repeats(report: Reporter, element: Element) -> None:
-    once = _ONCE.get(element.tag)
+    once = _SINGLE_CHILDREN.get(element.tag)
     if once is None:
         return
     seen: dict[str, Element] = {}
@@ -322,20 +330,20 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
 #: Beginnings of tags that other rules (URDF202 and URDF112) report.
-_REPORTED = ("xacro:", "xi:include")
+_PREFIXES_OF_OTHER_RULES = ("xacro:", "xi:include")
 
 
 def check_prefixes(report: Reporter, root: Element) -> None:
-    for prefix, places in _undeclared_prefixes(root).items():
+    for prefix, places in _find_undeclared_prefixes(root).items():
         element, attribute = places[0]
-        message = f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file"
-        remedy = f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix'
-        found = quoted(attribute or f"<{element.tag}>") + _more(places)
+        message = f"the prefix {quote(prefix)} is not declared; most XML readers refuse the file"
+        remedy = f'write xmlns:{shorten(prefix)}="..." in <robot>, or remove the names with this prefix'
+        found = quote(attribute or f"<{element.tag}>") + _count_more(places)
         report.add(UNDECLARED_PREFIX, message, element, attribute=attribute, found=found, remedy=remedy)
 
 
-def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
-    found: dict[str, list[_Place]] = {}
+def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
+    found: dict[str, list[_Occurrence]] = {}
     declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes xml and xmlns.
     stack = [(root, False)]
     while stack:
@@ -359,7 +367,7 @@ def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
 
     For a prefix of the tag, yield None instead of an attribute name.
     """
-    if ":" in element.tag and not element.tag.startswith(_REPORTED):
+    if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
         if ":" in key:
@@ -373,7 +381,7 @@ NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
 #: Names with more characters are reported, because long names break tables and file paths.
-LONGEST = 200
+MAX_NAME_LENGTH = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
@@ -381,33 +389,33 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
-        _check_odd(report, name, element)
+        _check_odd_name(report, name, element)
         _check_blanks(report, element)
         _check_reserved(report, name, element, root_joint)
     for kind in (links, joints):
         _check_lookalikes(report, kind)
 
 
-def _check_odd(report: Reporter, name: str, element: Element) -> None:
+def _check_odd_name(report: Reporter, name: str, element: Element) -> None:
     reasons = {
         "the name contains characters that cannot be printed": not name.isprintable(),
         "the name begins or ends with a space": name != name.strip(),
         "the name contains a slash, like a path": "/" in name or "\\" in name,
         "the name begins like a spreadsheet formula": name[0] in "=+-@",
-        f"the name has {len(name)} characters": len(name) > LONGEST,
+        f"the name has {len(name)} characters": len(name) > MAX_NAME_LENGTH,
         "the name contains a special character of shells or XML": bool(set(name) & set("\"'<>&|;`$")),
     }
     if reason := next((text for text, is_true in reasons.items() if is_true), None):
         remedy = "use letters, digits, - and _"
-        report.add(ODD_NAME, reason, element, attribute="name", found=quoted(name), remedy=remedy)
+        report.add(ODD_NAME, reason, element, attribute="name", found=quote(name), remedy=remedy)
 
 
 def _check_blanks(report: Reporter, element: Element) -> None:
-    raw = report.raw(element, "name") if report.has_raw_blanks else None
-    if raw is not None and any(c in raw for c in "\t\r\n"):
+    raw_value = report.raw_value(element, "name") if report.has_raw_blanks else None
+    if raw_value is not None and any(c in raw_value for c in "\t\r\n"):
         message = "the name contains a tab or a line end"
         remedy = "write the name on one line, without tabs"
-        report.add(NAME_BLANKS, message, element, attribute="name", found=quoted(raw), remedy=remedy)
+        report.add(NAME_BLANKS, message, element, attribute="name", found=quote(raw_value), remedy=remedy)
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
@@ -416,25 +424,28 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
         report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
+        remedy = (
+            ", or load without root_joint" if root_joint else " before you load the robot with root_joint"
+        )
         report.add(
             RESERVED_NAME,
             f"the name is reserved for {what}",
             element,
             attribute="name",
-            remedy="rename the link or joint" + ("" if root_joint else ", or load without root_joint"),
+            remedy=f"rename the {element.tag}{remedy}",
             severity=Severity.ERROR if root_joint else None,
         )
 
 
-def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> None:
+def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]]) -> None:
     seen: dict[str, str] = {}
-    for name, element in named:
-        if name.isascii() or len(name) > LONGEST:
+    for name, element in named_elements:
+        if name.isascii() or len(name) > MAX_NAME_LENGTH:
             continue  # Long names are slow to compare, and URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
-            message = "another name looks the same, but has different characters"
+            message = "another name looks the same or nearly the same, but has different characters"
             remedy = "use only one of the two spellings"
             found = ascii(name) + " and " + ascii(first)
             report.add(LOOKALIKE, message, element, attribute="name", found=found, remedy=remedy)
@@ -443,48 +454,48 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
 BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
 UNUSED_COMMENT = Rule("URDF121", "unused-comment", NOTE)
 
-_FORM = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.DOTALL)
-_BETWEEN = re.compile(r"[,\s]+")
+_COMMENT_PATTERN = re.compile(r"\s*urdfkin:\s*ignore\s*\[([^\]]*)\]\s*(.*)", re.DOTALL)
+_CODE_SEPARATOR = re.compile(r"[,\s]+")
 
 
-def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
+def apply_comments(report: Reporter, codes: Mapping[str, str]) -> None:
     """Apply the comments that silence findings, and report invalid comments."""
-    silences = Silences()
+    comment_index = CommentIndex()
     for comment in report.comments:
-        if (silence := _read(report, comment, codes)) is not None:
-            silences.add(silence)
-    report.silence(silences)
+        if (ignore := _read_comment(report, comment, codes)) is not None:
+            comment_index.add(ignore)
+    report.silence(comment_index)
 
 
-def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silence | None:
-    match = _FORM.fullmatch(comment.text)
-    words = [word for word in _BETWEEN.split(match[1]) if word] if match else []
+def _read_comment(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> IgnoreComment | None:
+    match = _COMMENT_PATTERN.fullmatch(comment.text)
+    words = [word for word in _CODE_SEPARATOR.split(match[1]) if word] if match else []
     unknown = next((word for word in words if word.lower() not in codes), None)
     reason = " ".join(match[2].split()) if match else ""
     remedy: str | None
     if words and unknown is None and reason:
-        return Silence(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
+        return IgnoreComment(comment, tuple(dict.fromkeys(codes[word.lower()] for word in words)), reason)
     if not words:
         what, remedy = "no code in brackets", "write <!-- urdfkin: ignore[URDF503] the reason -->"
     elif unknown is not None:
         close = report.nearest(unknown.lower(), codes)
-        what = f"unknown code {quoted(unknown)}"
+        what = f"unknown code {quote(unknown)}"
         remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
     else:
         what, remedy = "no reason is given", "write the reason after the bracket"
     message = f"{what}, so the comment silences nothing"
-    found = quoted(f"<!--{comment.text}-->")
+    found = quote(f"<!--{comment.text}-->")
     report.add(BAD_COMMENT, message, found=found, remedy=remedy, position=(comment.line, comment.column))
     return None
 
 
-def check_unused(report: Reporter) -> None:
+def check_unused_comments(report: Reporter) -> None:
     """Report codes in comments that silenced no finding. Call this after all other rules."""
-    for silence in report.silences.all:
-        for code in silence.codes:
-            if code not in silence.used:
-                comment = silence.comment
+    for ignore in report.comment_index.comments:
+        for code in ignore.codes:
+            if code not in ignore.used_codes:
+                comment = ignore.comment
                 message = f"{code} is silenced, but there is no warning or note with this code here"
                 remedy = "remove the code from the comment; an error cannot be silenced"
-                found, position = quoted(f"<!--{comment.text}-->"), (comment.line, comment.column)
+                found, position = quote(f"<!--{comment.text}-->"), (comment.line, comment.column)
                 report.add(UNUSED_COMMENT, message, found=found, remedy=remedy, position=position)

@@ -15,10 +15,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from urdfkin.urdf import parser
-from urdfkin.urdf.findings import ERROR, NOTE, REFUSES, WARNING, Fix, Reporter, Rule, Severity, quoted
-from urdfkin.urdf.parser import LONGEST, SHORTEST
+from urdfkin.urdf.findings import ERROR, NOTE, REFUSES, WARNING, Fix, Reporter, Rule, Severity, quote
+from urdfkin.urdf.parser import MAX_VECTOR_LENGTH, MIN_VECTOR_LENGTH
 from urdfkin.urdf.records import (
-    AXIAL,
+    AXIAL_TYPES,
     FURTHER_LIMITS,
     Element,
     JointRecord,
@@ -39,33 +39,33 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
-    sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
-    return _one_root(report, robot) and sound and bool(robot.links)
+    edges = [joint for joint in robot.joints if _check_ends(report, robot, joint)]
+    is_tree = len(edges) == len(robot.joints) and _check_parents(report, robot, edges)
+    return _check_root(report, robot) and is_tree and bool(robot.links)
 
 
-def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
+def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
-            message, at = f"the {tag} link does not exist", joint.element.first(tag)
-            remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quoted(link)}/>"
-            report.add(UNKNOWN_LINK, message, at, attribute="link", found=quoted(link), remedy=remedy)
+            message, at = f"the {tag} link does not exist", joint.element.find(tag)
+            remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quote(link)}/>"
+            report.add(UNKNOWN_LINK, message, at, attribute="link", found=quote(link), remedy=remedy)
     if joint.parent is not None and joint.parent == joint.child:
-        message, at = "the joint connects a link with itself", joint.element.first("child")
-        remedy, found = "name another parent link or child link", quoted(joint.parent)
+        message, at = "the joint connects a link with itself", joint.element.find("child")
+        remedy, found = "name another parent link or child link", quote(joint.parent)
         report.add(SELF_PARENT, message, at, attribute="link", found=found, remedy=remedy)
         return False
     return joint.parent in robot.links and joint.child in robot.links
 
 
-def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+def _check_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
     """Report loops and additional parent joints of a link; return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
     visited: set[str] = set()
-    sound = True
+    is_tree = True
     for start in [link for link in robot.links if link not in children] + list(robot.links):
         if start in visited:
             continue
@@ -81,13 +81,13 @@ def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointReco
             child = joint.child or ""
             if child in visited:
                 _report_repeat(report, joint, first.get(child), loop=child in path)
-                sound = False
+                is_tree = False
                 continue
             visited.add(child)
             first[child] = joint
             path.add(child)
             stack.append((child, iter(below.get(child, ()))))
-    return sound
+    return is_tree
 
 
 def _joints_by_parent(joints: Iterable[JointRecord]) -> dict[str, list[JointRecord]]:
@@ -100,21 +100,21 @@ def _joints_by_parent(joints: Iterable[JointRecord]) -> dict[str, list[JointReco
 def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
     if loop:
         rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
-        parent = quoted(joint.parent or "")
+        parent = quote(joint.parent or "")
         message = f"the joint closes a loop: its child is an ancestor of its parent {parent}"
     else:
-        other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
+        other = f"joint {quote(first.name)} on line {first.element.line}" if first else "another joint"
         rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
         message = f"the child link is already the child of {other}"
-    at, found = joint.element.first("child"), quoted(joint.child or "")
+    at, found = joint.element.find("child"), quote(joint.child or "")
     report.add(rule, message, at, attribute="link", found=found, remedy=remedy)
 
 
-def _one_root(report: Reporter, robot: RobotRecord) -> bool:
+def _check_root(report: Reporter, robot: RobotRecord) -> bool:
     """Return whether exactly one link has no parent; report all further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
-    if not roots and robot.links and not report.failed:
+    if not roots and robot.links and not report.has_errors:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
@@ -124,7 +124,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
-            message = f"the link has no parent, and neither has {quoted(main)}"
+            message = f"the link has no parent, and neither has {quote(main)}"
             remedy = "connect this link with a joint, or remove it"
             report.add(SEVERAL_ROOTS, message, robot.links[root], attribute="name", remedy=remedy)
     return False
@@ -137,47 +137,49 @@ NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
 #: If the length of an axis differs from 1 by less than this number, the finding is a note.
 #: Numbers with few digits cause such differences.
-LENGTH_ROUNDING = 2e-4
+NOTE_LENGTH_ERROR = 2e-4
 
 #: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
-_ONE = 1e-12
+_UNIT_LENGTH_TOLERANCE = 1e-12
 
 #: An axis counts as the z axis if its xy part is at most this fraction of its z component.
-_LEAN = 1e-9
+_Z_AXIS_TOLERANCE = 1e-9
 
 #: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
 #: The number is the default tolerance of Eigen's function `isApprox`.
-_SNAPPED = 1e-12
+_EIGEN_TOLERANCE = 1e-12
 
 #: If an axis differs from a coordinate axis by at most this angle (rad), the difference is not reported.
 #: The error bounds in `verify.bounds` cover this difference.
-_TILT = 2.0**-52
+_NEGLIGIBLE_TILT = 2.0**-52
 
 
 def check_axes(report: Reporter, robot: RobotRecord) -> None:
     for joint in robot.joints:
-        if joint.kind in AXIAL:
+        if joint.kind in AXIAL_TYPES:
             _check_axis(report, joint)
         elif joint.kind == "planar":
             _check_planar(report, joint)
 
 
-def _written(joint: JointRecord) -> str:
+def _axis_text(joint: JointRecord) -> str:
     axis = joint.axis_element
-    return f"xyz={quoted(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+    if axis is None:
+        return 'the default "1 0 0"'
+    return f"xyz={quote(axis.attributes['xyz'])}" if "xyz" in axis.attributes else "<axis> without xyz"
 
 
 def _check_axis(report: Reporter, joint: JointRecord) -> None:
     if joint.axis is None or joint.axis_element is None:
         return
     length = math.hypot(*joint.axis)
-    if not SHORTEST < length < LONGEST:
+    if not MIN_VECTOR_LENGTH < length < MAX_VECTOR_LENGTH:
         what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
         message = f"the axis {what}"
         remedy = 'write a unit vector, such as xyz="0 0 1"'
-        found = _written(joint)
+        found = _axis_text(joint)
         report.add(NO_DIRECTION, message, joint.axis_element, attribute="xyz", found=found, remedy=remedy)
-    elif abs(length - 1.0) > _ONE:
+    elif abs(length - 1.0) > _UNIT_LENGTH_TOLERANCE:
         unit = unit_vector(joint.axis)
         written = " ".join(repr(x).removesuffix(".0") for x in unit)
         element = joint.axis_element
@@ -186,13 +188,13 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             f"the axis has length {length:.9g} and is normalised",
             element,
             attribute="xyz",
-            found=_written(joint),
+            found=_axis_text(joint),
             remedy=f'write xyz="{written}"',
-            fix=lambda: None if _snap(unit) else report.rewritten(element, "xyz", written),
-            severity=Severity.NOTE if abs(length - 1.0) < LENGTH_ROUNDING else None,
+            fix=lambda: None if _find_snapped_axis(unit) else report.make_value_fix(element, "xyz", written),
+            severity=Severity.NOTE if abs(length - 1.0) < NOTE_LENGTH_ERROR else None,
             weight=abs(length - 1.0),
         )
-    _check_snapped(report, joint, joint.axis, joint.axis_element)
+    _check_snapped_axis(report, joint, joint.axis, joint.axis_element)
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
@@ -203,32 +205,34 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
         return tuple(float(x / length) + 0.0 for x in numbers)  # Adding 0.0 turns -0.0 into 0.0.
 
 
-def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
-    if snapped := _snap(axis):
+def _check_snapped_axis(
+    report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element
+) -> None:
+    if snapped := _find_snapped_axis(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
         remedy = f'write xyz="{written}", or double all three numbers: Pinocchio then keeps the tilt'
         report.add(
             NEARLY_COORDINATE_AXIS, message, element,
-            attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
+            attribute="xyz", found=_axis_text(joint), remedy=remedy, weight=tilt,
         )  # fmt: skip
 
 
-def tilts(robot: RobotRecord) -> dict[str, float]:
+def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
     """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
-    axial = (joint for joint in robot.joints if joint.kind in AXIAL)
-    return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
+    axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
+    return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
 
-def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them."""
     if axis is None:
         return None
     for i in range(3):
         unit = tuple(float(i == k) for k in range(3))
         tilt = math.hypot(*(x for k, x in enumerate(axis) if k != i))
-        if tilt > _TILT and _is_approx(axis, unit):
+        if tilt > _NEGLIGIBLE_TILT and _is_approx(axis, unit):
             return unit, tilt
     return None
 
@@ -236,17 +240,17 @@ def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | Non
 def _is_approx(axis: Sequence[float], unit: Sequence[float]) -> bool:
     """Compute Eigen's `axis.isApprox(unit)`, with the same order of operations."""
     difference = sum((x - e) * (x - e) for x, e in zip(axis, unit, strict=True))
-    return difference <= _SNAPPED * _SNAPPED * min(sum(x * x for x in axis), 1.0)
+    return difference <= _EIGEN_TOLERANCE * _EIGEN_TOLERANCE * min(sum(x * x for x in axis), 1.0)
 
 
 def _check_planar(report: Reporter, joint: JointRecord) -> None:
     x, y, z = joint.axis or (0.0, 0.0, 0.0)
-    if z > 0.0 and math.hypot(x, y) <= _LEAN * z:
+    if z > 0.0 and math.hypot(x, y) <= _Z_AXIS_TOLERANCE * z:
         return
     at = joint.axis_element or joint.element
     message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
     remedy = 'rotate the origin until its z axis is the normal of the plane, and write <axis xyz="0 0 1"/>'
-    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
+    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_axis_text(joint), remedy=remedy)
 
 
 INVERTED_LIMIT = Rule("URDF507", "inverted-limit", ERROR)
@@ -265,13 +269,13 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
-            refused = strict or joint.kind in AXIAL
-            rule, effect = parser.IGNORED, "ignores the limit"
+            refused = strict or joint.kind in AXIAL_TYPES
+            rule, effect = parser.IGNORED_VALUE, "ignores the limit"
             if refused:
                 rule, effect = NEGATIVE_LIMIT, "refuses the file"
             message = f"the limit of {attribute} is negative; Pinocchio {effect}"
             remedy = "write the limit without its sign"
-            found = quoted(limit.element.attributes[attribute])
+            found = quote(limit.element.attributes[attribute])
             report.add(rule, message, limit.element, attribute=attribute, found=found, remedy=remedy)
     if joint.kind == "continuous":
         _check_continuous(report, limit)
@@ -298,13 +302,13 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
     written = [name for name in ("lower", "upper") if name in limit.element.attributes]
     if any(getattr(limit, name) for name in written):
         report.add(
-            parser.IGNORED,
+            parser.IGNORED_VALUE,
             "a continuous joint has no position limits; the limits are ignored",
             limit.element,
             attribute=written[0],
-            found=_written_bounds(limit),
+            found=_bounds_text(limit),
             remedy='remove the limits, or write type="revolute"',
-            fix=lambda: report.without(limit.element, *written),
+            fix=lambda: report.make_removal_fix(limit.element, *written),
         )
 
 
@@ -318,14 +322,14 @@ MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
-LARGEST = 1e6
+MAX_MIMIC_NUMBER = 1e6
 #: The limits of a mimic joint may exclude this fraction of the mimicked joint's range without a finding.
 #: Limits are often written with few digits, and therefore exclude a small fraction.
-LEAST_LOST = 1e-3
+NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
-    checker = _MimicChecker(report, robot.by_name, enabled)
+    checker = _MimicChecker(report, robot.joints_by_name, enabled)
     for joint in robot.joints:
         if joint.mimic is not None:
             checker.check(joint, joint.mimic)
@@ -351,7 +355,7 @@ class _MimicChecker:
             message,
             mimic.element,
             attribute=attribute,
-            found=None if written is None else f"{attribute}={quoted(written)}",
+            found=None if written is None else f"{attribute}={quote(written)}",
             remedy=remedy,
             severity=None if self.enabled else Severity.NOTE,
             fix=fix,
@@ -360,8 +364,8 @@ class _MimicChecker:
     def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
         if joint.kind == "fixed":
             message, remedy = "a fixed joint cannot mimic; <mimic> is ignored", "remove <mimic>"
-            fix = partial(self.report.without_element, mimic.element)
-            self.add(parser.IGNORED, message, mimic, "joint", remedy, fix)
+            fix = partial(self.report.make_element_removal_fix, mimic.element)
+            self.add(parser.IGNORED_VALUE, message, mimic, "joint", remedy, fix)
             return
         if joint.kind in ("planar", "floating"):
             message = f"a {joint.kind} joint has several coordinates and cannot mimic another joint"
@@ -369,32 +373,32 @@ class _MimicChecker:
             return
         leader = self.joints.get(mimic.leader)
         if leader is None:
-            self.unknown(mimic)
+            self.report_unknown(mimic)
         elif joint.name in self.in_loops:
             itself = leader is joint
-            message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
+            message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
-        elif leader.kind is not None and leader.kind not in AXIAL:
+        elif leader.kind is not None and leader.kind not in AXIAL_TYPES:
             count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
             message = f"the mimicked joint is {leader.kind} and has {count}"
             self.add(MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
         else:
-            self.check_sound(joint, mimic, leader)
+            self.check_rule(joint, mimic, leader)
 
-    def unknown(self, mimic: MimicRecord) -> None:
+    def report_unknown(self, mimic: MimicRecord) -> None:
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
-    def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
+    def check_rule(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
             message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
             remedy = "write a multiplier other than zero, or make the joint fixed"
             self.add(MIMIC_CONSTANT, message, mimic, "multiplier", remedy)
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
-            if abs(value) > LARGEST:
+            if abs(value) > MAX_MIMIC_NUMBER:
                 message = f"the {attribute} is far too large"
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
@@ -404,26 +408,26 @@ class _MimicChecker:
             message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
             remedy = "name the independent joint of the chain, because some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
-        if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
+        if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        from urdfkin.model.configuration import allowed_range, range_words
+        from urdfkin.model.configuration import format_range, restrict_range
         from urdfkin.model.tree import Limit
 
-        rule, leader = self.resolved(mimic)
+        rule, leader = self.resolve_chain(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
-        low, high = allowed_range(rule, bounds, *moving)
-        least = 0.0 if rule.multiplier == 0.0 else (1.0 - LEAST_LOST) * (moving[1] - moving[0])
+        low, high = restrict_range(rule, bounds, *moving)
+        least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
         # Rounding errors narrow a range of one value to an empty range.
-        single = [f"only {end:.6g}" for end in moving if allowed_range(rule, bounds, end, end) == (end, end)]
-        allowed = f"only {range_words((low, high))}" if low < high else (*single, "no value")[0]
-        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
+        allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {format_range(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
@@ -435,8 +439,8 @@ class _MimicChecker:
             severity=None if self.enabled else Severity.NOTE,
         )
 
-    def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
+    def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
+        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -485,38 +489,39 @@ OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
 #: A joint origin with a coordinate of at least this number (m) is probably in millimetres.
-FAR = 100.0
+SUSPICIOUS_LENGTH = 100.0
 
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
-TINY = 1e-4
+SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number, at least `MANY` and less than `ENDLESS`.
-#: For a joint without limits, some exporters write limits of at least `ENDLESS`.
-MANY, ENDLESS = 30.0, 1000.0
+#: A limit is probably in degrees if it is a whole number, at least `SUSPICIOUS_LIMIT` and less than
+#: `PLACEHOLDER_LIMIT`. For a joint without limits, some exporters write limits of at least
+#: `PLACEHOLDER_LIMIT`.
+SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
 #: If a rounded multiple of pi displaces a link by more than this length (m), the finding is a warning.
-NOTICEABLE = 1e-3
+NOTICEABLE_DISPLACEMENT = 1e-3
 
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
-ANGLE_ROUNDING = 1e-10
+NEGLIGIBLE_ANGLE = 1e-10
 
 #: Multiples of pi, each with a minimum number of decimals.
 #: A number in the file with fewer decimals is not reported as a rounded multiple of pi.
-_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
+_PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
 
 
-def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
-    """Report legal values that are probably mistakes. `sound` is True if the joints form a tree."""
-    reach = _reach(robot) if sound else {}
+def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
+    """Report legal values that are probably mistakes. `is_tree` is True if the joints form a tree."""
+    reach = _reach(robot) if is_tree else {}
     for joint in robot.joints:
         _check_angles(report, joint, reach)
         _check_lengths(report, joint)
         _check_neutral(report, joint)
-    _check_places(report, robot)
-    if sound:
-        _check_sums(report, robot, reach)
+    _check_equal_axes(report, robot)
+    if is_tree:
+        _check_total_length(report, robot, reach)
 
 
 def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float]) -> None:
@@ -524,15 +529,17 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
     if origin is not None and joint.quaternion is None:
         written = origin.attributes.get("rpy", "").split(maxsplit=3)
         if any(abs(angle) >= 10.0 for angle in joint.rpy):
-            message, found = "the angles of the origin look like degrees", quoted(" ".join(written))
+            message, found = "the angles of the origin look like degrees", quote(" ".join(written))
             _report_degrees(report, message, origin, "rpy", found)
         elif len(written) == 3:
             _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0))
     limit = joint.limit
     if limit is not None and joint.kind == "revolute":
         bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
-        if any(MANY <= abs(bound) < ENDLESS and bound == round(bound) for bound in bounds):
-            found = _written_bounds(limit)
+        if any(
+            SUSPICIOUS_LIMIT <= abs(bound) < PLACEHOLDER_LIMIT and bound == round(bound) for bound in bounds
+        ):
+            found = _bounds_text(limit)
             _report_degrees(report, "the limits look like degrees", limit.element, "lower", found)
 
 
@@ -540,9 +547,9 @@ def _report_degrees(report: Reporter, message: str, at: Element, attribute: str,
     report.add(DEGREES, message, at, attribute=attribute, found=found, remedy="write angles in radians")
 
 
-def _written_bounds(limit: LimitRecord) -> str:
+def _bounds_text(limit: LimitRecord) -> str:
     written = limit.element.attributes
-    return " ".join(f"{name}={quoted(written[name])}" for name in ("lower", "upper") if name in written)
+    return " ".join(f"{name}={quote(written[name])}" for name in ("lower", "upper") if name in written)
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
@@ -550,7 +557,7 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
-        found = rounded_pi(word, angle)
+        found = find_rounded_pi(word, angle)
         if found is None:
             continue
         exact[k], turns = repr(found[1]), turns + abs(angle - found[1])
@@ -559,52 +566,55 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
-    moves = f", which moves the links below by up to {_metres(off * reach)}" if reach > 0.0 else ""
+    named = f"-{_pi_text(multiple)}" if meant < 0.0 else _pi_text(multiple)
+    moves = f", which moves the links below by up to {_length_text(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
-        f"rpy contains a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
+        f"rpy contains a rounded {named}, off by {off:.1e} rad{moves}",
         origin,
         attribute="rpy",
-        found=quoted(text),
-        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; urdfkin uses the value in the file",
-        severity=Severity.WARNING if off * reach > NOTICEABLE else None,
+        found=quote(text),
+        remedy=f"write {meant!r} if you mean {named}; urdfkin uses the value in the file",
+        severity=Severity.WARNING if off * reach > NOTICEABLE_DISPLACEMENT else None,
         weight=off * reach,
-        fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), exact), turns),
+        fix=lambda: report.make_value_fix(
+            origin, "rpy", _replace_words(report.raw_value(origin, "rpy"), exact), turns
+        ),
     )
 
 
-def _replace_words(raw: str | None, words: list[str]) -> str:
-    blanks = re.split(r"[^ \t\r\n]+", raw or "")
+def _replace_words(raw_value: str | None, words: list[str]) -> str:
+    blanks = re.split(r"[^ \t\r\n]+", raw_value or "")
     if len(blanks) != len(words) + 1:  # The text contains references such as `&#32;`.
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
-def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
+def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
     """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
 
-    >>> rounded_pi("1.5708", 1.5708)
+    >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
-    >>> rounded_pi("1.5707963267948966", 1.5707963267948966) is None
+    >>> find_rounded_pi("1.5707963267948966", 1.5707963267948966) is None
     True
     """
     mantissa, _, exponent = text.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
     if exponent or not 2 <= decimals <= 14:
         return None
-    for multiple, least in _MULTIPLES:
+    for multiple, least in _PI_MULTIPLES:
         value = math.copysign(float(multiple) * math.pi, angle)
-        if decimals >= least and ANGLE_ROUNDING < abs(angle - value) < 10.0**-decimals:
+        if decimals >= least and NEGLIGIBLE_ANGLE < abs(angle - value) < 10.0**-decimals:
             return multiple, value
     return None
 
 
-def _as_pi(multiple: Fraction) -> str:
+def _pi_text(multiple: Fraction) -> str:
     top = "pi" if multiple.numerator == 1 else f"{multiple.numerator} pi"
     return top if multiple.denominator == 1 else f"{top}/{multiple.denominator}"
 
 
-def _metres(length: float) -> str:
+def _length_text(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
     # The format `:.2g` would write 120 as 1.2e+02.
@@ -614,13 +624,17 @@ def _metres(length: float) -> str:
 def _check_lengths(report: Reporter, joint: JointRecord) -> None:
     largest = max(abs(x) for x in joint.xyz)
     add = partial(report.add, MILLIMETRES, remedy="write lengths in metres")
-    if joint.origin_element is not None and largest >= FAR:
+    if joint.origin_element is not None and largest >= SUSPICIOUS_LENGTH:
         message = "the joint is very far from its parent link"
-        found = f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}"
+        found = f"xyz={quote(joint.origin_element.attributes.get('xyz', ''))}"
         add(message, joint.origin_element, attribute="xyz", found=found, weight=largest)
     limit = joint.limit
     if limit is not None and joint.kind == "prismatic":
-        far = [bound for bound in (limit.lower, limit.upper) if bound and FAR <= abs(bound) < ENDLESS]
+        far = [
+            bound
+            for bound in (limit.lower, limit.upper)
+            if bound and SUSPICIOUS_LENGTH <= abs(bound) < PLACEHOLDER_LIMIT
+        ]
         if far:
             message, found = "a prismatic joint moves very far", f"{far[0]:g}"
             attribute = "lower" if far[0] == limit.lower else "upper"
@@ -644,16 +658,16 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
         )
 
 
-def _check_places(report: Reporter, robot: RobotRecord) -> None:
+def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
-        if joint.kind not in AXIAL:
+        if joint.kind not in AXIAL_TYPES:
             continue
         place = (joint.parent, joint.kind, joint.xyz, joint.rpy, joint.quaternion, joint.axis)
         first = places.setdefault(place, joint)
         if first is not joint:
-            message = f"the joint has the same origin and axis as joint {quoted(first.name)}"
-            remedy = "ignore this finding if both joints are intended"
+            message = f"the joint has the same origin and axis as joint {quote(first.name)}"
+            remedy = "correct one of the two origins, or ignore this note if both joints are intended"
             report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
@@ -670,14 +684,14 @@ def _reach(robot: RobotRecord) -> dict[str, float]:
     return reach
 
 
-def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -> None:
+def _check_total_length(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -> None:
     whole = max(reach.values(), default=0.0)
     if math.isinf(whole):
         far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
         element = far.origin_element or far.element
         message = "the sum of the lengths along the chain is too large for a double"
-        found = quoted(element.attributes.get("xyz", ""))
+        found = quote(element.attributes.get("xyz", ""))
         report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
-    elif 0.0 < whole < TINY:
-        message = f"the sum of all lengths of the robot is {_metres(whole)}"
+    elif 0.0 < whole < SUSPICIOUS_ROBOT_SIZE:
+        message = f"the joint origins along the longest chain of the robot add up to {_length_text(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")

@@ -18,8 +18,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from urdfkin.urdf.mjcf import Listed
-    from urdfkin.urdf.usd import Remark
+    from urdfkin.urdf.mjcf import MjcfRemark
+    from urdfkin.urdf.usd import UsdRemark
 
 LEFT_OUT_MOTION = Rule("MJCF101", "left-out-motion", WARNING)
 LEFT_OUT = Rule("MJCF102", "left-out", NOTE)
@@ -40,16 +40,18 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
 #: Only this many bytes at the beginning of a file are searched for elements.
-_SEARCHED = 10_000_000
+_MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
-_NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
+_SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: MJCF elements that findings mention without a name: the tag in the file, and the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Pattern for the start of a prim in a USD text file.
 #: The pattern also matches delimiters of comments, strings, references, arrays and blocks.
-_USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
+_PRIM_OR_DELIMITER = re.compile(
+    rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
+)
 #: Beginnings and ends of comments, arrays, strings and references in a USD text file.
-_NO_PRIM = {
+_SKIPPED_TEXT = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
     **{quote: re.compile(rb"(?:\\.|[^\\])*?" + quote, re.DOTALL) for quote in (b'"""', b"'''", b'"', b"'")},
@@ -57,44 +59,63 @@ _NO_PRIM = {
     b"@": re.compile(rb"@"),
 }
 #: Line (from 1), column (from 1) and width of each element, by tag and name.
-_Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
+_Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
-def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, ...]:
-    parts = tuple(listed)
-    places = _positions(data, _elements) if any(part.where for part in parts) else {}
-    found = []
-    for part in parts:
-        tag, _, name = (part.where or "").partition(" ")
-        rule = LEFT_OUT_MOTION if part.moves else LEFT_OUT if part.remedy is None else ANGLE_UNIT
-        found.append(_finding(rule, part, file, tag or None, name or None, places))
-    return tuple(found)
+def make_mjcf_findings(remarks: Iterable[MjcfRemark], file: str, data: bytes) -> tuple[Finding, ...]:
+    remarks = tuple(remarks)
+    places = _find_positions(data, _find_elements) if any(remark.where for remark in remarks) else {}
+    findings = []
+    for remark in remarks:
+        tag, _, name = (remark.where or "").partition(" ")
+        rule = LEFT_OUT_MOTION if remark.moves else LEFT_OUT if remark.remedy is None else ANGLE_UNIT
+        findings.append(_make_finding(rule, remark, file, tag or None, name or None, places))
+    return tuple(findings)
 
 
-def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
-    found = tuple(remarks)
+def make_usd_findings(remarks: Iterable[UsdRemark], file: str, data: bytes) -> tuple[Finding, ...]:
+    remarks = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
-    is_text = data.startswith(b"#usda") and any(one.where for one in found)
-    places = _positions(data, _prims) if is_text else {}
+    is_text = data.startswith(b"#usda") and any(remark.where for remark in remarks)
+    places = _find_positions(data, _find_prims) if is_text else {}
     return tuple(
-        _finding(rules[one.kind], one, file, "prim" if one.where else None, one.where or None, places)
-        for one in found
+        _make_finding(
+            rules[remark.kind], remark, file, "prim" if remark.where else None, remark.where or None, places
+        )
+        for remark in remarks
     )
 
 
-def _finding(
-    rule: Rule, one: Listed | Remark, file: str, element: str | None, name: str | None, places: _Places
+def _make_finding(
+    rule: Rule,
+    remark: MjcfRemark | UsdRemark,
+    file: str,
+    element: str | None,
+    name: str | None,
+    places: _Positions,
 ) -> Finding:
     line, column, width = places.get((element, name), (1, 1, 0))
     return Finding(
-        rule.id, rule.severity, one.what, None, one.remedy, file, line, column, element, name, width=width
+        rule.id,
+        rule.severity,
+        remark.what,
+        None,
+        remark.remedy,
+        file,
+        line,
+        column,
+        element,
+        name,
+        width=width,
     )
 
 
-def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
+def _find_positions(
+    data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]
+) -> _Positions:
     """Return the position of each element, or of the first element if elements have the same name."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
-    for element, name, first, last in search(data[:_SEARCHED]):
+    for element, name, first, last in search(data[:_MAX_SEARCHED_BYTES]):
         found.setdefault((element, name), (first, last))
     places, line, start, cursor = {}, 1, 0, 0
     for key, (first, last) in sorted(found.items(), key=lambda item: item[1]):
@@ -106,7 +127,7 @@ def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | 
     return places
 
 
-def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
+def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
     An equality constraint without a name is named by its index. If the file includes other files, the index
@@ -115,7 +136,7 @@ def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
     while at >= 0:
-        end = next((end for begin, end in _NO_ELEMENT.items() if data.startswith(begin, at)), None)
+        end = next((end for begin, end in _SKIPPED_MARKUP.items() if data.startswith(begin, at)), None)
         tag = None if end else START_TAG.match(data, at)
         if end is not None:
             at = data.find(end, at)
@@ -126,9 +147,9 @@ def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
         else:
             word = tag[0][1:].split(None, 1)[0].rstrip(b"/>").decode("utf-8", "replace")
             last, name = at + 1 + len(word.encode()), None
-            for one in ATTRIBUTE.finditer(data, last, tag.end()):
-                if one[1] == b"name":
-                    name, last = unescape(one[2][1:-1].decode("utf-8", "replace")), one.end()
+            for match in ATTRIBUTE.finditer(data, last, tag.end()):
+                if match[1] == b"name":
+                    name, last = unescape(match[2][1:-1].decode("utf-8", "replace")), match.end()
             includes = includes or word == "include"
             if "worldbody" in above and word in ("body", "joint", "freejoint") and name is not None:
                 yield word.removeprefix("free"), name, at, last
@@ -143,10 +164,10 @@ def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
         at = data.find(b"<", at + 1)
 
 
-def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
+def _find_prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
     """Yield "prim", the path and the span (in bytes) of each prim in a USD text file."""
     above, prim, cursor, inside = list[str](), "", 0, 0
-    while (found := _USDA.search(data, cursor)) is not None:
+    while (found := _PRIM_OR_DELIMITER.search(data, cursor)) is not None:
         cursor, token = found.end(), found[0]
         if found[1] is not None:
             prim = "/" + found[1].decode("utf-8", "replace")
@@ -159,7 +180,7 @@ def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
         elif token == b"}":
             del above[len(above) if inside else -1 :]
         else:
-            end = _NO_PRIM[token].search(data, cursor)
+            end = _SKIPPED_TEXT[token].search(data, cursor)
             if end is None:
                 return
             cursor = end.end()
