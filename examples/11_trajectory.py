@@ -6,12 +6,12 @@ You learn to plan a motion from rest to rest, to compute the whole motion of a f
 import numpy as np
 
 import urdfkin
-from urdfkin.robot.trajectory import line
+from urdfkin.robot.trajectory import make_line_trajectory
 
 robot = urdfkin.load("ur5")
 start = np.array([0.0, -1.5, 1.2, -1.0, -1.5, 0.0])
 end = np.array([1.5, -0.8, 0.6, -1.2, -1.0, 0.5])
-motion = line(robot, start, end, duration=2.0, samples=101)
+motion = make_line_trajectory(robot, start, end, duration=2.0, samples=101)
 tool = urdfkin.frame_motion(robot, motion, "tool0")
 
 speed = np.linalg.norm(tool.velocity[:, :3], axis=1)

@@ -42,7 +42,7 @@ from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import read_history
 from urdfkin.report.html import as_files, as_html
 from urdfkin.report.same import as_html as same_page
-from urdfkin.robot.trajectory import line
+from urdfkin.robot.trajectory import make_line_trajectory
 from urdfkin.validation.campaign import validate
 from urdfkin.verify.pinocchio import PinocchioOracle
 
@@ -204,7 +204,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
     server = new_server(port=8097)
     try:
         robot, q = urdfkin.load("planar_two_link"), np.array([0.4, 0.8])
-        Viewer(server, robot, q, line(robot, q, -q, 2.0, 20) if plays else None)
+        Viewer(server, robot, q, make_line_trajectory(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
         ready = (  # The controls are hidden on a phone.

@@ -30,7 +30,7 @@ from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_ou
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS
 from scripts.benchmarking.tables import machine_of, tables
 from scripts.benchmarking.timing import DifferenceError, Row
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.verify.oracles import versions
 
 SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints", "frames", "sizes", "memory")
@@ -93,7 +93,7 @@ def main(words: Sequence[str] | None = None) -> int:
     given = parser.parse_args(words)
     contenders = ALWAYS if given.no_peers else ALWAYS + PEERS
     try:
-        with only("compiled"):
+        with use_only("compiled"):
             figures = document(QUICK if given.quick else Plan(), given.only, contenders)
     except DifferenceError as difference:
         print(f"results differ: {difference}", file=sys.stderr)

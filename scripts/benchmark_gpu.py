@@ -40,7 +40,7 @@ from scripts.benchmarking.contenders import positions
 from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import FrameCode
-from urdfkin.export.forms import code_of_robot
+from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
 
@@ -201,7 +201,7 @@ def main(words: list[str] | None = None) -> int:
         return _failed("CUDA's driver finds no GPU here. Use a machine with a GPU, or --compile-only.")
     robot = urdfkin.load(given.robot)
     frame = given.frame or robot.tip_frame
-    code = code_of_robot(robot, frame, QUANTITIES, "local_world_aligned")
+    code = make_robot_code(robot, frame, QUANTITIES, "local_world_aligned")
     with tempfile.TemporaryDirectory() as folder:
         try:
             programs = compiled(code, Path(folder), compiler)

@@ -29,7 +29,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
-from urdfkin.compiled.preload import Way, only
+from urdfkin.compiled.preload import ComputeMode, use_only
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -47,7 +47,7 @@ THREADS = (None, 1, 2, 3)
 KEPT, FRAMES = 9, 6
 #: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED = 3
-WAYS: tuple[Way, ...] = ("interpreted", "compiled")
+WAYS: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
 Arrays = Mapping[str, Any]
 
@@ -130,7 +130,7 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
     for what, quantity, reference, inputs in subject.results():
         row, found = [x[INTERPRETED] for x in inputs], []
         for way in WAYS:
-            with only(way):
+            with use_only(way):
                 found.append(subject.computed(quantity, reference, subject.frames, row))
         if not same(*found):
             yield f"{what}: interpreted"
@@ -195,7 +195,7 @@ def main(words: Sequence[str] | None = None) -> int:
     everything, wrong = dict[str, Any](), 0
     for name in given.robots or known:
         subject = Subject.of(name, before)
-        with only("compiled"):
+        with use_only("compiled"):
             now = to_keep(subject)
             found = list(differing(subject, now))
         found += differing_interpreted(subject)

@@ -39,7 +39,7 @@ from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import DOCS, inserted, table
 from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
 from urdfkin.export.code import FrameCode
-from urdfkin.export.forms import code_of_robot
+from urdfkin.export.forms import make_robot_code
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import example_robots
 
@@ -57,7 +57,7 @@ _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
 def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
-    return code_of_robot(robot, frame, quantities, "local_world_aligned", verify=True)
+    return make_robot_code(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
 def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
@@ -197,7 +197,7 @@ def page(text: str) -> str:
         written = code(robot, frame, (quantity,))
         lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
         sizes = (
-            f"{written.functions[0].operations:,}",
+            f"{written.functions[0].operation_count:,}",
             f"{lines.count(chr(10)):,}",
             f"{len(lines) / 1000:.0f}",
         )

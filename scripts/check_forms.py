@@ -33,7 +33,7 @@ from scripts.forms import poses
 from scripts.pages import table as markdown
 from urdfkin.dh import FORMATS, DHTable, export, read_table, to_urdf
 from urdfkin.dh.convert import link_names, to_tree
-from urdfkin.dh.export.code import plain
+from urdfkin.dh.export.code import sanitize
 from urdfkin.errors import InputError
 from urdfkin.export import LANGUAGES
 from urdfkin.kinematics.roundings import EPS, table_roundings
@@ -119,7 +119,7 @@ def in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
         (folder / f"{name}.m").write_text(text, "utf-8")
         lines.append(f"{'[f, x]' if form == 'matlab-symbolic' else 'f'} = {name}();")
         for q in job.given(form):
-            numbers, tip = "; ".join(map(repr, q)), f"{plain(job.table.tip_frame)}_tip"
+            numbers, tip = "; ".join(map(repr, q)), f"{sanitize(job.table.tip_frame)}_tip"
             exact = "; ".join(f"vpa('{x!r}')" for x in q)
             value = {
                 "matlab": f"f.placement([{numbers}])",

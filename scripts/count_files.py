@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 
 import urdfkin
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 
 ROOT = Path(urdfkin.__file__).parent
 ROBOTS = Path(__file__).parents[1] / "robots"
@@ -52,7 +52,7 @@ def files_of_load(source: Path) -> list[str]:
 def files_of_same(first: Path, second: Path) -> list[str]:
     """Return the files whose functions run during `same`, without compiling kernels."""
     same = partial(urdfkin.same, first, second)
-    with only("compiled"):
+    with use_only("compiled"):
         same()
         return files_run(same)
 

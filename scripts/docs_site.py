@@ -34,7 +34,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
         "Configurations",
         "Joint values `q`: named poses, samples, limits, integration, and the conversion to other tools.",
         "neutral poses sample limit_violations integrate difference to_pinocchio from_pinocchio "
-        "pinocchio_model convention with_convention locked",
+        "pinocchio_model convention with_convention with_locked_joints",
     ),
     "api/kinematics.md": (
         "Kinematics",
@@ -57,7 +57,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/fast.md": (
         "Fast evaluation",
         "Evaluators of one frame for a control loop, and kinematics as source code.",
-        "prepare urdfkin.compiled.prepared.PreparedFrame compiled "
+        "prepare urdfkin.compiled.prepared.PreparedFrame compile "
         "urdfkin.export.compiled_frame.CompiledFrame export torch",
     ),
     "api/tables.md": (

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 
 import urdfkin
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 
 PARTS = 5
 _ROBOT = """<robot name="r{k}">
@@ -50,7 +50,7 @@ def usage() -> dict[str, float]:
 
 def measure(n: int) -> list[dict[str, float]]:
     # A kernel that is loaded later would look like a leak.
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []
         for k in range(n):

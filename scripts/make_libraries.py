@@ -25,7 +25,7 @@ import platformdirs
 
 import urdfkin
 from scripts.pages import DOCS, inserted, table
-from urdfkin.comparison.readers import values_of
+from urdfkin.comparison.readers import joint_values
 from urdfkin.validation.vectors import Feature, features
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
@@ -49,7 +49,7 @@ VERDICTS = {
 
 
 def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    return [values_of(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
+    return [joint_values(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:

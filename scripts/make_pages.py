@@ -23,12 +23,12 @@ import urdfkin
 from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.kinematics.registry import equations_page
 from urdfkin.model.configuration import draw_base_motion
 from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, shorten
 from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, check
@@ -177,7 +177,7 @@ def study() -> dict[str, str]:
 
 
 def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
-    lines = [line for study in studies.values() for line in plain(study)["lines"]]
+    lines = [line for study in studies.values() for line in as_json_data(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 Each line of the tables below compares the typical errors of both libraries:
@@ -211,7 +211,7 @@ LENGTHS = (3, 10, 30, 100)
 def enclosures() -> dict[str, str]:
     heads = ("robot", "joints", "digits", "widest, steps", "urdfkin inside", "Pinocchio inside", "ms")
     long = ("joints", "digits", "acceleration", "widest interval", "ms")
-    with only("compiled"):
+    with use_only("compiled"):
         robots = table(heads, _of_robots(), left=1)
         return {
             "robots": f"{ENCLOSED} samples, Pinocchio {version()}:\n\n{robots}",

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import urdfkin
-from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.kinematics.bodies import MovingFrame, link_endpoint, link_endpoint_velocity, point_acceleration
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import (
@@ -225,7 +225,7 @@ def breakdown(figure: Any) -> None:
             for k, color in enumerate(colors):
                 value = float(parts.terms[j, k, component])
                 look: dict[str, Any] = {"color": color, "hatch": hatches[k], "edgecolor": "white"}
-                look |= {"label": KINDS[k] if j == 0 else None, "width": 0.7, "linewidth": 0}
+                look |= {"label": ACCELERATION_KINDS[k] if j == 0 else None, "width": 0.7, "linewidth": 0}
                 panel.bar(j, value, bottom=above if value >= 0 else below, **look)
                 above, below = (above + value, below) if value >= 0 else (above, below + value)
         panel.axhline(0, color=QUIET, linewidth=0.8)

@@ -32,7 +32,7 @@ from xml.etree import ElementTree
 
 import urdfkin
 from scripts.pages import table
-from urdfkin.comparison.bounds import MOST_BOXES
+from urdfkin.comparison.bounds import MAX_BOXES
 from urdfkin.comparison.result import Sameness, Verdict, angle, length
 from urdfkin.urdf.catalogue import catalogue
 
@@ -130,7 +130,7 @@ def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sa
         files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
             source = _loaded(files[0]) if TOOLS[tool].reads else robot
-            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST_BOXES)
+            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MAX_BOXES)
         except urdfkin.UrdfkinError as error:
             raise RefusalError(f"not compared: {error.what}") from None
 
@@ -163,7 +163,7 @@ def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple
     elif not found:
         verdict = str(found.unexplained[0]) if found.unexplained else found.differences[0].words
     if tool != "urdf-usd-converter":
-        return verdict, length(found.written[0]), angle(found.written[1])
+        return verdict, length(found.bound_as_written[0]), angle(found.bound_as_written[1])
     off = length(0.0 if found.worst is None else found.worst.upper)
     if found.single is None:
         return "the stage has no rounded number", off, ""

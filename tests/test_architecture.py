@@ -103,7 +103,7 @@ def test_import_and_help_load_no_heavy_module() -> None:
 
 
 #: Two kinds of numbers have these classes: numbers in Python, and numbers in a compiled kernel.
-TWICE = {"Known", "Product"}
+TWICE = {"ConstantNumber", "Product"}
 
 
 def test_each_class_has_its_own_name() -> None:

@@ -22,7 +22,7 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bar
 from scripts.benchmarking.tables import tables
 from scripts.benchmarking.timing import Calls, DifferenceError, Row, Work, agree, measure
 from tests.urdfs import joint, robot
-from urdfkin.compiled.plan import StepField, program_of
+from urdfkin.compiled.plan import StepField, compile_program
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
@@ -136,7 +136,7 @@ def test_generated_code_computes_the_robots_results_and_writes_only_the_output(q
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_a_batch_with_all_its_steps_gives_the_complete_result(quantity: str) -> None:
     with Subject(*SUBJECTS[0], 9) as subject:
-        program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
+        program = compile_program(subject.plan, orientations=False, columns=quantity == "jacobian")
         sizes = [sections.cut(program, end) for end in range(1, len(sections.PARTS) + 1)]
         np.testing.assert_array_equal(sizes[-1].words, program.words)
         lengths = [len(part.words) for part in sizes]

@@ -60,7 +60,7 @@ def test_a_number_outside_the_bound_fails_the_run_in_a_library(
 
 
 def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(check_exports, "examples", lambda: ("hyq", "ur5"))
+    monkeypatch.setattr(check_exports, "example_robots", lambda: ("hyq", "ur5"))
     names = [(name, frame) for name, _, frame in check_exports.subjects(tips=False)]
     tips = [(name, frame) for name, _, frame in check_exports.subjects(tips=True)]
     robots = {name: urdfkin.load(name) for name in ("hyq", "ur5")}
@@ -76,10 +76,10 @@ def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.Monk
 @pytest.mark.slow
 def test_exact_code_is_checked_with_its_own_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("planar_two_link")
-    made: Any = exact.exact_functions
+    made: Any = exact.make_exact_functions
     found = check_exports.found_of(robot, "tip", ["sympy-exact"])
     assert found.pop("good")
     assert 0.0 <= found.pop("sympy-exact float64") < 1e-30
     assert not found
-    monkeypatch.setattr(exact, "exact_functions", lambda *given: made(*given[:-1], False))
+    monkeypatch.setattr(exact, "make_exact_functions", lambda *given: made(*given[:-1], False))
     assert not check_exports.found_of(robot, "tip", ["sympy-exact"])["good"]

@@ -21,7 +21,7 @@ from scripts.fuzzing.evaluate import evaluate as evaluate_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.system.processes import ask_python
+from urdfkin.system.processes import run_python
 from urdfkin.urdf.records import FURTHER_LIMITS
 from urdfkin.verify import mjcf_check
 
@@ -206,8 +206,8 @@ def test_an_mjcf_reader_that_differs_from_mujoco_is_detected(monkeypatch: pytest
     assert evaluate(text).word == "verified"
 
     def without_shapes(*arguments: Any) -> tuple[bytes, int | None]:
-        output, status = ask_python(*arguments)
+        output, status = run_python(*arguments)
         return output.splitlines(keepends=True)[0], status
 
-    monkeypatch.setattr(mjcf_check, "ask_python", without_shapes)
+    monkeypatch.setattr(mjcf_check, "run_python", without_shapes)
     assert evaluate(text).word == "MuJoCo reads another robot"

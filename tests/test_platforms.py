@@ -29,7 +29,7 @@ def test_machine_code_loads_from_a_temporary_file_without_files_in_memory(
     source.write_text("double twice(double x) { return 2.0 * x; }\n")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
     monkeypatch.delattr(os, "memfd_create")
-    twice = compiled_frame._load(library.read_bytes()).twice
+    twice = compiled_frame._load_code(library.read_bytes()).twice
     twice.argtypes, twice.restype = [ctypes.c_double], ctypes.c_double
     assert twice(21.0) == 42.0
 

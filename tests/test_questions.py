@@ -14,7 +14,7 @@ from tests.cli.running import good
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
 from tests.urdfs import joint, limit, mimic
-from urdfkin.cli.explain import answer_to, answers, as_text
+from urdfkin.cli.explain import answers, find_answer, format_answer
 from urdfkin.errors import QuestionsSection, UrdfkinError
 from urdfkin.urdf import xacro
 from urdfkin.verify.pinocchio import _wrong_module
@@ -110,8 +110,8 @@ ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
         _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
     QuestionsSection.LOCKED_JOINTS: [
-        _raised(lambda: urdfkin.load("panda").locked("ready")),
-        _raised(lambda: _ur5().locked({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
+        _raised(lambda: urdfkin.load("panda").with_locked_joints("ready")),
+        _raised(lambda: _ur5().with_locked_joints({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
     ],
     QuestionsSection.DEGREES: [lambda: _warned(lambda: _ur5().integrate(np.full(6, 40.0), np.zeros(6)))],
     QuestionsSection.SINGULARITY: [_typed("singular-values", "--help")],
@@ -142,9 +142,9 @@ def test_a_message_names_the_section_of_each_common_problem() -> None:
 
 def test_one_word_is_enough_to_find_a_question() -> None:
     for words, topic in (("mimic", "mimic-joints"), ("Meshes", "packages-and-meshes"), ("unit axes", AXES)):
-        assert answer_to(words) == answers()[topic]
-    assert answer_to("frames") is None  # two questions contain the word
-    assert answer_to("") is None
+        assert find_answer(words) == answers()[topic]
+    assert find_answer("frames") is None  # two questions contain the word
+    assert find_answer("") is None
     assert run("explain", "mimic").text.startswith("Mimic joints\n")
     assert run("explain", "frames").code == 2
 
@@ -152,7 +152,7 @@ def test_one_word_is_enough_to_find_a_question() -> None:
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # one answer is about a warning
 @pytest.mark.parametrize("topic", answers())
 def test_an_answer_on_a_terminal_is_wrapped_and_its_code_runs(topic: str) -> None:
-    shown = as_text(answers()[topic])
+    shown = format_answer(answers()[topic])
     assert "`" * 3 not in shown
     assert all(len(line) <= 88 for line in shown.splitlines() if not line.startswith("    "))
     own = "".join(re.findall(r"```python\n(.*?)```", answers()[topic], re.DOTALL))

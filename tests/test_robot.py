@@ -24,7 +24,7 @@ from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
-from urdfkin.robot import _INTERNAL, Robot
+from urdfkin.robot import _INTERNAL_NAMES, Robot
 from urdfkin.robot.loading import as_robot
 from urdfkin.verify import verifier
 from urdfkin.verify.comparison import BatchComparison
@@ -333,7 +333,7 @@ def test_the_oracle_reads_only_names_and_layout_from_the_tree(panda: Robot) -> N
     assert (one == two).all()
 
 
-@pytest.mark.parametrize("name", sorted({name for name in vars(Robot) if name[0] != "_"} - _INTERNAL))
+@pytest.mark.parametrize("name", sorted({name for name in vars(Robot) if name[0] != "_"} - _INTERNAL_NAMES))
 def test_the_help_of_a_method_describes_each_argument_in_the_order_of_its_signature(name: str) -> None:
     text, method = inspect.getdoc(vars(Robot)[name]) or "", vars(Robot)[name]
     section = text.partition("Args:\n")[2].partition("\n\n")[0]

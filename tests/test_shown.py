@@ -14,7 +14,7 @@ import urdfkin
 from tests.attacks.hostile import NAMES, urdf
 from tests.markup import Page
 from urdfkin.dh.export import export
-from urdfkin.dh.units import units_of
+from urdfkin.dh.units import parse_units
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
@@ -77,7 +77,7 @@ def test_its_repr_is_one_short_line(name: str, objects: dict[str, Any]) -> None:
 
 
 def test_a_table_has_the_text_of_the_command_line(robot: Robot) -> None:
-    table, units = robot.dh(snap=1e-6), units_of("degrees", "millimetres", 6)
+    table, units = robot.dh(snap=1e-6), parse_units("degrees", "millimetres", 6)
     for form in ("markdown", "latex", "html"):
         own = getattr(table, f"to_{form}")("degrees", "mm", 6)
         assert own == export(table, form, units).rstrip("\n")

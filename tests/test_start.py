@@ -16,7 +16,7 @@ from tests.reading import present
 from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_text
 from urdfkin.cli import commands
-from urdfkin.cli.explain import anchor, answers
+from urdfkin.cli.explain import answers, make_anchor
 from urdfkin.model.tree import FloatArray
 
 ROOT = Path(__file__).parent.parent
@@ -41,7 +41,7 @@ def pinocchios_jacobian(file: Path, q: FloatArray) -> FloatArray:
 
 def test_the_readme_links_to_the_start_and_to_the_questions() -> None:
     lines = (DOCS / "index.md").read_text().splitlines()
-    headings = [anchor(line[3:]) for line in lines if line[:3] == "## "]
+    headings = [make_anchor(line[3:]) for line in lines if line[:3] == "## "]
     (start,) = re.findall(r"\(docs/index\.md#([\w-]+)\)", README)
     assert start in headings
     assert "(docs/questions.md)" in README

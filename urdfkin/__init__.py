@@ -72,8 +72,8 @@ _HOMES = {
 # A package imports only from packages that are earlier in the list of docs/architecture.md.
 # A hook lets a package call a function of a higher package without importing that package.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
-register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
-register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))
+register_hook("code of a robot", lazy_import("urdfkin.export.forms:make_robot_code"))
+register_hook("code of a chain", lazy_import("urdfkin.export.forms:make_chain_code"))
 register_hook("a robot of a source", lazy_import("urdfkin.robot.loading:load"))
 register_hook("code in a language", lazy_import("urdfkin.export:write"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))

@@ -85,7 +85,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
         into = partial(method, *inputs, subject.frame, out=out, threads=threads, verify=False)
         yield Work(ONE if threads == 1 else SEVERAL, n, into, lambda: out)
     yield Work(FRESH, n, fresh, lambda: last[0])
-    fast = getattr(subject.robot.compiled(subject.frame), quantity)
+    fast = getattr(subject.robot.compile(subject.frame), quantity)
     yield Work(COMPILED, n, partial(fast, *inputs, out=own, threads=1), lambda: own)
     yield Work(FLOOR, n, partial(floor.fill, 1.0))
 
@@ -101,7 +101,7 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
         f"prepared.{quantity}()": f"prepared.{call})",
     }
     if not verify:
-        names["compiled"] = robot.compiled(frame)
+        names["compiled"] = robot.compile(frame)
         lines |= {f"{who}.{quantity}(out=)": f"{who}.{call}, out=out)" for who in ("prepared", "compiled")}
     for shown, line in lines.items():
         yield Calls(f"urdfkin, {shown}", names, (line,))

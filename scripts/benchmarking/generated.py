@@ -48,12 +48,12 @@ def results(
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
         R, d = _pose(plan.geometry[i])
         state = recursion.rotate_frame(recursion.translate_frame(state, d), R)
-        turns = JointMotion(kind) is JointMotion.TURN
+        turns = JointMotion(kind) is JointMotion.REVOLUTE
         columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
         if turns:
             S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
             state = recursion.after_revolute(state, _Z, S, v[i], a[i])
-        elif JointMotion(kind) is JointMotion.SLIDE:
+        elif JointMotion(kind) is JointMotion.PRISMATIC:
             state = recursion.after_prismatic(state, _Z, x[i], v[i], a[i])
         else:
             raise ValueError("a joint with more than one coordinate")
@@ -83,7 +83,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
     """Return a function of the batch size and the addresses of q, v, a and the results."""
     plan, folder = subject.plan, subject.folder
-    turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
+    turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
         "Q_AT": plan.steps[:, StepField.Q],
         "V_AT": plan.steps[:, StepField.V],

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import urdfkin
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
@@ -85,7 +85,7 @@ def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:
 def _use(model: Robot, frame: str, use: str) -> None:
     inputs = [np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)][: USES[use]]
     of_prepared, _, name = use.rpartition(".")
-    with only("compiled"):
+    with use_only("compiled"):
         if of_prepared:
             getattr(model.prepare(frame), name)(*inputs)
         else:
@@ -100,7 +100,7 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, n)
         out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
         few = tuple(x[:64] for x in inputs)
-        with only("compiled"):
+        with use_only("compiled"):
             method(*few, frame, verify=False, threads=2)  # This call loads compiled code and starts threads.
         Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
         before = _bytes("VmRSS")

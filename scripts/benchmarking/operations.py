@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled import outputs, recursion
-from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
+from urdfkin.compiled.plan import (
+    AXIS_ROWS,
+    INSTRUCTION_WIDTH,
+    CompiledTree,
+    Op,
+    ProgramHeader,
+    compile_program,
+)
 from urdfkin.kinematics.arithmetic import bind_equations
 
 #: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
@@ -26,30 +33,30 @@ _SINE_COSINE = 51
 class Number:
     """A result without a value, which stores the numbers it is computed from.
 
-    `known` is the value of a constant 0 or 1, and None for all other numbers.
+    `constant` is the value of a constant 0 or 1, and None for all other numbers.
     """
 
-    known: int | None = None
+    constant: int | None = None
     #: If true, no result needs the number. Operations with such a number are not counted.
-    nothing: bool = False
+    unused: bool = False
     made_of: tuple[Number, ...] = ()
 
     def __add__(self, other: Number) -> Number:
-        if self.nothing or other.nothing:
-            return self if self.nothing else other
-        if self.known == 0 or other.known == 0:
-            return other if self.known == 0 else self
+        if self.unused or other.unused:
+            return self if self.unused else other
+        if self.constant == 0 or other.constant == 0:
+            return other if self.constant == 0 else self
         return Number(made_of=(self, other))
 
     __sub__ = __add__
 
     def __mul__(self, other: Number) -> Number:
-        if self.nothing or other.nothing:
-            return self if self.nothing else other
-        if self.known is not None:
-            return other if self.known else self
-        if other.known is not None:
-            return self if other.known else other
+        if self.unused or other.unused:
+            return self if self.unused else other
+        if self.constant is not None:
+            return other if self.constant else self
+        if other.constant is not None:
+            return self if other.constant else other
         return Number(made_of=(self, other))
 
     def __rmul__(self, other: int) -> Number:
@@ -64,16 +71,16 @@ class Number:
 
 def count(results: Any) -> int:
     """Return the number of operations that compute these results; a shared operation counts once."""
-    waiting, seen = [results], set[Number]()
+    waiting, visited = [results], set[Number]()
     while waiting:
         value = waiting.pop()
         if isinstance(value, Number):
-            if value.made_of and value not in seen:
-                seen.add(value)
+            if value.made_of and value not in visited:
+                visited.add(value)
                 waiting += value.made_of
         elif isinstance(value, tuple | list):
             waiting += value
-    return len(seen)
+    return len(visited)
 
 
 @dataclass
@@ -83,19 +90,24 @@ class _Walk:
     written: list[Any] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        x, zero, one, nothing = Number(), Number(0), Number(1), Number(nothing=True)
+        x, zero, one, unused = Number(), Number(0), Number(1), Number(unused=True)
         triple = (x, x, x)
         self.names: dict[str, Any] = {
             "eq": bind_equations(),
-            **{name: lambda *_: x for name in ("number", "number_if", "constant", "same")},
-            **{name: lambda *_: triple for name in ("vector", "_vector", "_vector_if")},
-            **{name: lambda *words: self.written.append(words[-1]) for name in ("put", "put_vector")},
-            **{name: lambda *_: None for name in ("write_rows", "numbers_of")},
-            "_coordinate": lambda *_: x,
-            "_rate": lambda *_: x,
+            **{
+                name: lambda *_: x for name in ("load_number", "load_number_if", "load_constant", "broadcast")
+            },
+            **{name: lambda *_: triple for name in ("load_vector", "_constant_vector", "_load_vector_if")},
+            **{
+                name: lambda *words: self.written.append(words[-1])
+                for name in ("store_number", "store_vector")
+            },
+            **{name: lambda *_: None for name in ("write_rows", "array_data")},
+            "_joint_coordinate": lambda *_: x,
+            "_joint_rate": lambda *_: x,
             "zero": lambda: zero,
             "one": lambda: one,
-            "nothing": lambda: nothing,
+            "unused": lambda: unused,
         }
         for module in (recursion, outputs):
             for name, value in vars(module).items():
@@ -110,29 +122,29 @@ class _Walk:
 def operations(plan: CompiledTree, quantity: str) -> int:
     """Count operations for one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
     columns = quantity == "jacobian"
-    program, run = program_of(plan, turned=False, columns=columns), _Walk()
+    program, run = compile_program(plan, orientations=False, columns=columns), _Walk()
     words: list[int] = program.words.tolist()
-    angles = (words[Head.ANGLES_END] - words[Head.ANGLES]) // 4
-    output = {"jacobian": "place"}.get(quantity, quantity)
-    state = getattr(run.call, f"mask_{output}")(run.state)
-    total, at = angles * _SINE_COSINE, int(words[Head.CODE])
+    angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
+    output = {"jacobian": "placement"}.get(quantity, quantity)
+    state = getattr(run.call, f"mask_for_{output}")(run.state)
+    total, at = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
     while words[at] != Op.END:
-        total += _cost(run, words[at : at + WIDTH], quantity, state)
-        at += WIDTH
+        total += _cost(run, words[at : at + INSTRUCTION_WIDTH], quantity, state)
+        at += INSTRUCTION_WIDTH
     return total
 
 
 def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, ...]) -> int:
-    op, row, _, how, c = instruction
+    op, row, _, flags, c = instruction
     run.written.clear()
     world = run.call.world_axes
-    if op <= Op.TURN:
-        return count(run.call._along_link(world, op, state, None, c))
+    if op <= Op.ROTATE:
+        return count(run.call._execute_transform(world, op, state, None, c))
     if op <= Op.FLOATING:
-        return count(run.call._over_joint(world, op, state, None, row, 0, 0, how, None, c))
+        return count(run.call._execute_joint(world, op, state, None, row, 0, 0, flags, None, c))
     if op == Op.COLUMN:
-        run.call.column_jacobian(None, row % STORED_ROWS, 0, how, None, c, 2, state)
-    elif op == Op.EMIT and quantity != "jacobian":
-        emit = run.call.emit_velocity if quantity == "velocity" else run.call.emit_acceleration
-        emit(1, None, [1] * len(Head), 0, 0, 0, 2, state, None)
+        run.call.write_jacobian_column(None, row % AXIS_ROWS, 0, flags, None, c, 2, state)
+    elif op == Op.WRITE and quantity != "jacobian":
+        write = run.call.write_velocity if quantity == "velocity" else run.call.write_acceleration
+        write(1, None, [1] * len(ProgramHeader), 0, 0, 0, 2, state, None)
     return count(run.written)

@@ -22,10 +22,10 @@ from scripts.benchmarking.contenders import (
 from scripts.benchmarking.operations import operations
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
 from scripts.benchmarking.timing import Calls, Row, Work, agree, measure, times
-from urdfkin.compiled.evaluate import is_staged, task_of
+from urdfkin.compiled.evaluate import make_kernel_args, uses_buffer
 from urdfkin.compiled.machine import kernels
-from urdfkin.compiled.machine.single import single
-from urdfkin.compiled.plan import WIDTH, Head, KernelProgram, Op, program_of
+from urdfkin.compiled.machine.single import make_single_evaluator
+from urdfkin.compiled.plan import INSTRUCTION_WIDTH, KernelProgram, Op, ProgramHeader, compile_program
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -145,16 +145,16 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
-    "forward recursion": frozenset(Op) - {Op.END, Op.STORE, Op.COLUMN, Op.EMIT},
-    "columns": frozenset((Op.STORE, Op.COLUMN)),
-    "writing results": frozenset((Op.EMIT,)),
+    "forward recursion": frozenset(Op) - {Op.END, Op.STORE_AXIS, Op.COLUMN, Op.WRITE},
+    "columns": frozenset((Op.STORE_AXIS, Op.COLUMN)),
+    "writing results": frozenset((Op.WRITE,)),
 }
 
 
 def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
     """Yield the time of each step of a batch, in ns for one configuration."""
     for subject, quantity, _ in _contests("where", n):
-        program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
+        program = compile_program(subject.plan, orientations=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
         if quantity == "acceleration":
             works = [work for work in works if work.who != "columns"]
@@ -169,20 +169,20 @@ def cut(program: KernelProgram, parts: int) -> KernelProgram:
     """Return a program with only the instructions of its first `parts` steps."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
-    code = words[words[Head.CODE] :].reshape(-1, WIDTH)
+    code = words[words[ProgramHeader.CODE] :].reshape(-1, INSTRUCTION_WIDTH)
     chosen = [line for line in code if Op(line[0]) in ops]
-    end = np.zeros((1, WIDTH), dtype=np.int64)
-    words = np.concatenate([words[: words[Head.CODE]], *chosen, *end])
+    end = np.zeros((1, INSTRUCTION_WIDTH), dtype=np.int64)
+    words = np.concatenate([words[: words[ProgramHeader.CODE]], *chosen, *end])
     if parts < 2:
-        words[Head.ANGLES_END] = words[Head.ANGLES]
+        words[ProgramHeader.ANGLES_END] = words[ProgramHeader.ANGLES]
     return replace(program, words=words)
 
 
 def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> Work:
     inputs = [FIXED_BASE_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))
-    staged = who == "writing results" and is_staged(out)
-    task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
+    buffered = who == "writing results" and uses_buffer(out)
+    task, memory = make_kernel_args(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered)
     core = getattr(kernels, f"{quantity}s")
     owners = program, memory, out, inputs  # The kernel arguments contain the addresses of these arrays.
 
@@ -222,7 +222,7 @@ class _Empty:
 
 def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     q_v_a = "q" if quantity == "jacobian" else "q, v, a"
-    compute, _ = single(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
+    compute, _ = make_single_evaluator(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
     names = {
         "robot": subject.robot,
         "fast": subject.robot.prepare(subject.frame),

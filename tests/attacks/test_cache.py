@@ -24,9 +24,9 @@ from urdfkin import compiled as recursion
 from urdfkin import kinematics
 from urdfkin.compiled import kernel_cache, machine
 from urdfkin.compiled.machine import compiling
-from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
+from urdfkin.compiled.machine.compiling import FLOATS_1D, Kernel
 from urdfkin.system import cache
-from urdfkin.system.cache import CacheWarning, cache_folder, get, put
+from urdfkin.system.cache import CacheWarning, make_cache_folder, read_cached_file, write_cached_file
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +36,7 @@ def _no_warning_yet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(compiling, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiling, "kernel_cache_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -49,7 +49,7 @@ def third_number(x: Any) -> Any:
 
 
 def new_kernel() -> Kernel:
-    return Kernel(third_number, (NUMBERS,))
+    return Kernel(third_number, (FLOATS_1D,))
 
 
 def call(kernel: Kernel) -> int:
@@ -57,7 +57,7 @@ def call(kernel: Kernel) -> int:
 
 
 def was_compiled(kernel: Kernel) -> bool:
-    return bool(kernel.compiled.stats.cache_misses)
+    return bool(kernel.compiled_function.stats.cache_misses)
 
 
 def with_one_bit_flipped(content: bytes) -> bytes:
@@ -82,7 +82,7 @@ def test_a_kernel_is_compiled_once_and_compiled_again_if_the_file_is_invalid(fol
     assert not was_compiled(again)
     assert call(again) == 7
     (file,) = folder.iterdir()
-    put(file, pickle.dumps(("not", "a", "kernel")))
+    write_cached_file(file, pickle.dumps(("not", "a", "kernel")))
     with pytest.warns(CacheWarning, match="is damaged and is computed again"):
         assert call(new_kernel()) == 7
     assert not was_compiled(new_kernel())
@@ -106,15 +106,15 @@ def test_a_cached_file_copied_to_another_folder_is_rejected(tmp_path: Path) -> N
     first, second = tmp_path / "library-1" / "machine.code", tmp_path / "library-2" / "machine.code"
     for path in (first, second):
         path.parent.mkdir()
-    put(first, b"of the first")
+    write_cached_file(first, b"of the first")
     second.write_bytes(first.read_bytes())
     with pytest.warns(CacheWarning, match="the checksum of the file does not match its content and its name"):
-        assert get(second) is None
-    assert get(first) == b"of the first"
+        assert read_cached_file(second) is None
+    assert read_cached_file(first) == b"of the first"
     moved = tmp_path / "elsewhere" / "library-1"  # The whole cache is moved.
     moved.parent.mkdir()
     first.parent.rename(moved)
-    assert get(moved / "machine.code") == b"of the first"
+    assert read_cached_file(moved / "machine.code") == b"of the first"
 
 
 # -- no space --------------------------------------------------------------------------------------
@@ -160,10 +160,10 @@ def limit_file_size() -> Iterator[Callable[[int], None]]:
 def test_an_incomplete_write_leaves_no_file(tmp_path: Path, limit_file_size: Callable[[int], None]) -> None:
     limit_file_size(1000)
     with pytest.warns(CacheWarning, match=f"the cache cannot be written in .*: {os.strerror(errno.EFBIG)}"):
-        put(tmp_path / "kept", bytes(5000))
+        write_cached_file(tmp_path / "kept", bytes(5000))
     assert list(tmp_path.iterdir()) == []
-    put(tmp_path / "kept", bytes(500))
-    assert get(tmp_path / "kept") == bytes(500)
+    write_cached_file(tmp_path / "kept", bytes(500))
+    assert read_cached_file(tmp_path / "kept") == bytes(500)
 
 
 @pytest.mark.long
@@ -207,11 +207,11 @@ def test_a_command_with_a_damaged_cache_prints_one_warning_and_replaces_the_file
 
 def demand_refused(root: Path, words: str) -> None:
     with pytest.warns(CacheWarning, match=words):
-        assert cache_folder("kernels", [], root=root) is None
+        assert make_cache_folder("kernels", [], root=root) is None
 
 
 def created(root: Path, *words: str, kind: str = "kernels") -> Path:
-    return present(cache_folder(kind, [], *words, root=root))
+    return present(make_cache_folder(kind, [], *words, root=root))
 
 
 def test_a_new_cache_is_private_and_only_a_private_group_may_write_in_it(
@@ -277,11 +277,13 @@ def test_a_kernel_of_another_user_is_not_unpickled_and_its_old_folder_is_not_del
 ) -> None:
     if os.geteuid() != 0:
         pytest.skip("only the superuser can change the owner of a folder")
-    monkeypatch.setattr(compiling, "cache_folder", lambda: cache_folder("kernels", [], root=tmp_path))
+    monkeypatch.setattr(
+        compiling, "kernel_cache_folder", lambda: make_cache_folder("kernels", [], root=tmp_path)
+    )
     call(new_kernel())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
-    put(file, pickle.dumps(Malicious(tmp_path / "ran")))
+    write_cached_file(file, pickle.dumps(Malicious(tmp_path / "ran")))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
         assert call(new_kernel()) == 7
@@ -325,8 +327,8 @@ def test_the_kernel_cache_depends_on_every_source_file(
         seen.extend(sources)
         return tmp_path
 
-    monkeypatch.setattr(cache, "cache_folder", recording)
-    uncached: Callable[[], Path | None] = kernel_cache.cache_folder.__wrapped__
+    monkeypatch.setattr(cache, "make_cache_folder", recording)
+    uncached: Callable[[], Path | None] = kernel_cache.kernel_cache_folder.__wrapped__
     assert uncached() == tmp_path
     folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
     files = {path for folder in folders for path in folder.glob("*.py")}
@@ -339,7 +341,7 @@ def test_a_trusted_owner_of_parent_folders_may_not_own_the_cache(
 ) -> None:
     owner = tmp_path.stat().st_uid
     assert cache._unsafe_reason(tmp_path) is None
-    monkeypatch.setattr(cache, "_TRUSTED", (0, owner))
+    monkeypatch.setattr(cache, "_TRUSTED_OWNERS", (0, owner))
     monkeypatch.setattr("os.geteuid", lambda: owner + 1)
     assert str(cache._unsafe_reason(tmp_path)).startswith(f"{tmp_path} belongs to another user")
 
@@ -350,12 +352,12 @@ def test_a_change_in_any_source_selects_another_folder(changed: int, tmp_path: P
     for source in sources:
         source.write_text("x = 1")
     first, again, *others = (
-        cache_folder(kind, sources, version, root=tmp_path)
+        make_cache_folder(kind, sources, version, root=tmp_path)
         for kind, version in (("things", "1.0"), ("things", "1.0"), ("things", "1.1"), ("trees", "1.0"))
     )
     assert first == again
     sources[changed].write_text("x = 2")
-    others.append(cache_folder("things", sources, "1.0", root=tmp_path))
+    others.append(make_cache_folder("things", sources, "1.0", root=tmp_path))
     assert len({first, *others}) == 4
     assert all(present(folder).is_dir() for folder in (first, *others))
 

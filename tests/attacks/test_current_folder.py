@@ -70,7 +70,7 @@ def test_compiling_runs_no_file_of_the_current_folder(
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     script = Path(command[-1])
     script.write_text(
-        "from urdfkin.compiled.machine.single import one_configuration\none_configuration.compiled\n"
+        "from urdfkin.compiled.machine.single import one_configuration\none_configuration.compiled_function\n"
     )
     run(folder, command)
     assert list((folder.parent / "cache").rglob("*.kernel"))
@@ -83,7 +83,7 @@ def test_the_compiling_process_succeeds_and_runs_no_file_of_the_current_folder(
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`
-    with preload._compile_elsewhere(("placements",)) as process:
+    with preload._start_compiler(("placements",)) as process:
         assert process.wait() == 0
     demand_nothing_ran(folder)
 

@@ -11,11 +11,11 @@ import urdfkin
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.dh.arms import CONVENTIONS, published, with_cells
-from urdfkin.dh import dh_table, units_of
-from urdfkin.dh.compare import compare, document
+from urdfkin.dh import make_dh_table, parse_units
+from urdfkin.dh.compare import compare, comparison_document
 from urdfkin.dh.convert import to_tree
-from urdfkin.dh.parse_table import read_mapping, reference_path, table_of
-from urdfkin.dh.rows import last_digits
+from urdfkin.dh.parse_table import parse_table_data, read_mapping, reference_path
+from urdfkin.dh.rows import half_digits_by_row
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import KinematicTree
@@ -33,17 +33,17 @@ def test_a_wrong_d1_is_reported_in_millimetres_with_and_without_a_fit() -> None:
     wrong = with_cells(table, 0, d=table.rows[0].d + 0.01)
     found = compare(path, wrong)
     assert found.agrees  # the table agrees after a fit of the base
-    assert not found.as_written
-    assert found.written_metres == pytest.approx(0.01, rel=1e-6)
+    assert not found.is_exact_unfitted
+    assert found.unfitted_metres == pytest.approx(0.01, rel=1e-6)
     assert found.base.metres == pytest.approx(0.01, rel=1e-6)
     assert (0, "d") in found.hidden
-    text = document(found, units_of("radians", "millimetres")).text()
+    text = comparison_document(found, parse_units("radians", "millimetres")).text()
     assert "very cell" not in text
     assert "after a fit of base, tool and joint offsets" in text
     assert "changed the base by 10 mm" in text
     assert "has the same effect: d1" in text
-    assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
-    assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
+    assert [(one.row, one.cell) for one in found.unfitted_differences] == [(0, "d")]
+    assert found.unfitted_differences[0].difference == pytest.approx(-0.01, rel=1e-6)
     found = compare(path, wrong, fit=False)
     assert not found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(0, "d")]
@@ -58,7 +58,7 @@ CELLS = [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
 @pytest.mark.parametrize(("row", "cell"), CELLS)
 def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
     path, _ = published("ur5")
-    table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
+    table = make_dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
     assert compare(path, table, fit=False).agrees
     wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
     found = compare(path, wrong, fit=False)
@@ -70,8 +70,8 @@ def test_every_cell_agrees_only_for_a_table_that_is_the_urdf_as_written() -> Non
     robot, ends = urdfkin.load("panda"), ("panda_link8", "panda_link0")
     table, path = robot.dh(*ends), robot.chain(*ends)
     found = compare(path, table)
-    assert found.as_written
-    assert "Every cell agrees with the URDF." in document(found, units_of()).text()
+    assert found.is_exact_unfitted
+    assert "Every cell agrees with the URDF." in comparison_document(found, parse_units()).text()
     assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
     tool = np.array(table.tool)
     tool[:3, :3] = tool[:3, :3] @ exp_rotation(np.array([0.0, 0.0, 0.5]))
@@ -84,7 +84,7 @@ def test_cells_that_do_not_explain_the_difference_are_not_listed() -> None:
     found = compare(*published("kinova"), fit=False)
     assert not found.agrees
     assert found.differences == ()
-    text = document(found, units_of()).text()
+    text = comparison_document(found, parse_units()).text()
     assert "No change of cells explains the whole difference" in text
     assert "Omit --no-fit" in text
 
@@ -107,7 +107,7 @@ CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
 def test_a_calibrated_table_differs_about_equally_in_strict_and_hayati_form(name: str, seed: int) -> None:
     robot, base, tip = with_ends(name)
     tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
-    forms = (dh_table(tree, tip, base, near_parallel=form) for form in ("hayati", "strict"))
+    forms = (make_dh_table(tree, tip, base, near_parallel=form) for form in ("hayati", "strict"))
     hayati, strict = (compare(path, table).metres for table in forms)
     assert 1e-4 < hayati < 3e-3
     assert strict <= 1.5 * hayati
@@ -116,18 +116,18 @@ def test_a_calibrated_table_differs_about_equally_in_strict_and_hayati_form(name
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
 def test_no_cell_of_a_nominal_table_has_a_far_larger_effect_than_the_tip_error(name: str, seed: int) -> None:
     robot, base, tip = with_ends(name)
-    nominal = dh_table(robot.tree, tip, base, snap=1e-4)
-    strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
+    nominal = make_dh_table(robot.tree, tip, base, snap=1e-4)
+    strict = make_dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
     assert max(abs(row.d) for row in strict.rows) > 100.0
     found = compare(make_chain(to_tree(strict), tip, base), nominal)
     assert found.metres < 3e-3
-    assert found.differences[0].tip <= 2.0 * found.metres
+    assert found.differences[0].tip_displacement <= 2.0 * found.metres
     assert found.residual <= 1e-9
 
 
 def test_cells_that_differ_are_sorted_by_the_effect_on_the_tip() -> None:
-    table = dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
-    effects = [one.tip for one in compare(published("ur5")[0], table).differences]
+    table = make_dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
+    effects = [one.tip_displacement for one in compare(published("ur5")[0], table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)
 
@@ -152,11 +152,13 @@ def test_a_difference_within_the_last_digit_is_distinguished_from_a_larger_one(
         ".csv": "\n".join(["# convention: standard", "a,alpha,d,theta", *lines]),
     }[suffix])  # fmt: skip
     data = read_mapping(file)
-    found = compare(published("ur5")[0], table_of(data, "sheet"), digits=last_digits(data))
+    found = compare(
+        published("ur5")[0], parse_table_data(data, "sheet"), half_digits=half_digits_by_row(data)
+    )
     largest = found.differences[0]
     assert (largest.row, largest.cell) == (4, "d")
     assert largest.is_rounding == is_rounding
-    assert ("within the last digit" in document(found, units_of()).text()) == is_rounding
+    assert ("within the last digit" in comparison_document(found, parse_units()).text()) == is_rounding
 
 
 def test_the_dh_command_marks_rounded_cells_and_has_the_option_no_fit(tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ from tests.dh.arms import arm, with_cells
 from tests.random_chains import rotation, shift
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic, robot
-from urdfkin.dh import DHTable, Units, dh_table, export
-from urdfkin.dh.export.text import printed
+from urdfkin.dh import DHTable, Units, export, make_dh_table
+from urdfkin.dh.export.text import measure_printed_table
 from urdfkin.dh.parse_table import reference_path
-from urdfkin.dh.snapping import noisy_cells
-from urdfkin.dh.units import Angles, Lengths
+from urdfkin.dh.snapping import find_noisy_cells
+from urdfkin.dh.units import AngleUnit, LengthUnit
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import make_chain
@@ -84,7 +84,7 @@ def test_an_inexact_strict_table_exits_with_3_and_the_hayati_or_snapped_table_wi
 
 def test_a_wrong_strict_table_with_very_long_rows_is_a_disagreement() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
-    table = dh_table(robot.tree, "tip", "l0", near_parallel="strict")
+    table = make_dh_table(robot.tree, "tip", "l0", near_parallel="strict")
     with pytest.raises(TableError, match="DISAGREES"):
         robot.verifier.table(with_cells(table, 0, alpha=table.rows[0].alpha + 1e-3))
 
@@ -155,7 +155,7 @@ def test_a_tilt_by_two_angles_of_fifteen_digits_is_treated_as_rounding(near_para
 @pytest.mark.parametrize("tilt", [1e-13, 1e-12, 1e-9])
 def test_a_tilt_larger_than_rounding_gives_hayati_rows(tilt: float) -> None:
     tree = leaning(tilt)
-    table = dh_table(tree, "tip", "l0")
+    table = make_dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
     q = np.random.default_rng(0).uniform(-3, 3, (50, 4))
     assert np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max() <= 20 * EPS
@@ -169,7 +169,7 @@ def test_the_strict_table_of_so101_is_short_and_baxter_gets_a_hint_to_snap() -> 
     assert max(abs(row.d) for row in table.rows) < 1.0
     hint = next(line for line in good("dh baxter").text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
-    assert noisy_cells(urdfkin.load("baxter").dh(snap=1e-11)) == []
+    assert find_noisy_cells(urdfkin.load("baxter").dh(snap=1e-11)) == []
     assert "--snap" not in command("dh baxter --snap 1e-11").text
 
 
@@ -288,9 +288,9 @@ def test_the_rounding_error_of_printed_digits_is_within_the_stated_bound(
     name: str, digits: int, convention: str
 ) -> None:
     robot = urdfkin.load(name, verify=False)
-    table = dh_table(robot.tree, robot.tip_frame, convention=convention)
-    for units in (Units(digits=digits), Units(Angles.DEGREES, Lengths.MILLIMETRES, digits)):
-        found = printed(table, units)
+    table = make_dh_table(robot.tree, robot.tip_frame, convention=convention)
+    for units in (Units(digits=digits), Units(AngleUnit.DEGREES, LengthUnit.MILLIMETRES, digits)):
+        found = measure_printed_table(table, units)
         assert found.bound is not None
         assert found.metres <= found.bound
         assert found.bound <= 100.0 * max(found.metres, 1e-15)
@@ -309,7 +309,7 @@ def test_the_stated_rounding_error_is_the_distance_to_the_printed_table() -> Non
         for row, (a, alpha, d) in zip(table.rows, typed, strict=True)
     )
     again = replace(table, rows=tuple(rows))
-    found = printed(table, Units(Angles.DEGREES, Lengths.MILLIMETRES, 3))
+    found = measure_printed_table(table, Units(AngleUnit.DEGREES, LengthUnit.MILLIMETRES, 3))
     q = np.random.default_rng(5).uniform(-math.pi, math.pi, (2000, len(table.joint_names)))
     apart = np.linalg.norm((again.placement(q) - table.placement(q))[:, :3, 3], axis=-1)
     assert apart.max() == pytest.approx(found.metres, rel=0.05)

@@ -132,7 +132,9 @@ def test_a_table_with_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
 
 def test_commands_and_cached_kernels_work_with_numba_disable_jit(tmp_path: Path) -> None:
     assert "verified by Pinocchio" in good_shell("$URDFKIN placement ur5", NUMBA_DISABLE_JIT="1")
-    compiling = "from urdfkin.compiled.machine.single import one_configuration as made; print(made.compiled)"
+    compiling = (
+        "from urdfkin.compiled.machine.single import one_configuration as made; print(made.compiled_function)"
+    )
     env = {"NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
     assert "<Numba C callback" in running.python(compiling, env=os.environ | env).stdout
     assert list(tmp_path.rglob("*.kernel"))
@@ -174,7 +176,7 @@ def test_an_unusual_file_name_raises_an_error_of_urdfkin(name: str) -> None:
 def test_a_pipe_without_a_writer_is_refused_and_reading_ends_at_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(files, "PATIENCE", 0.1)
+    monkeypatch.setattr(files, "PIPE_TIMEOUT", 0.1)
     os.mkfifo(tmp_path / "pipe.urdf")
     os.mkfifo(tmp_path / "pipe.toml")
     with pytest.raises(SourceError, match="a pipe without a writer"):

@@ -16,7 +16,7 @@ from tests.export.writing import code, file, need
 from tests.urdfs import loaded
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.code import FrameCode
-from urdfkin.export.naming import all_safe, comment_name, safe, title
+from urdfkin.export.naming import comment_name, function_prefix, safe_name, unique_safe_names
 
 pytestmark = pytest.mark.slow
 _PYTHON = [to for to, (_, suffix) in LANGUAGES.items() if suffix.endswith(".py")]
@@ -115,7 +115,7 @@ def test_exported_c_code_defines_only_the_exported_functions(written: FrameCode,
 
 @given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))
 def test_identifiers_are_valid_and_unique(names: list[str]) -> None:
-    found = all_safe(names)
+    found = unique_safe_names(names)
     assert len({word.lower() for word in found}) == len(names)
     for word in found:
         assert re.fullmatch(r"[A-Za-z0-9_]{1,60}", word)
@@ -129,5 +129,5 @@ def test_a_name_in_a_comment_cannot_end_the_comment(name: str) -> None:
         assert text == "" or text.isprintable()
         assert not set("*\"'\\%\n") & set(text)
         assert len(text) < 100
-    assert title(name, name)[0].isalpha()
-    assert re.fullmatch(r"\w+", safe(name), re.ASCII)
+    assert function_prefix(name, name)[0].isalpha()
+    assert re.fullmatch(r"\w+", safe_name(name), re.ASCII)

@@ -382,14 +382,14 @@ def test_the_breakdown_on_a_distant_base_equals_the_breakdown_at_the_origin(refe
 
 
 def scale_transverse_terms(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = breakdown._terms
+    right = breakdown._joint_terms
 
     def wrong(*x: FloatArray) -> FloatArray:
         terms = right(*x)  # type: ignore[arg-type]
         terms[:, 0] *= 1.0 + 1e-9
         return terms
 
-    monkeypatch.setattr(breakdown, "_terms", wrong)
+    monkeypatch.setattr(breakdown, "_joint_terms", wrong)
 
 
 def breakdown_error(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationError:

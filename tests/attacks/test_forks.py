@@ -85,13 +85,13 @@ CASES = {
         """,
     "a kernel, while another thread compiles one": """
         from urdfkin.compiled import kernel_cache
-        held(kernel_cache.compiling)
+        held(kernel_cache.compile_lock)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """
         from urdfkin.system import processes
         held(processes._stack_size_lock)
-        fork(lambda: processes.with_stack(2**24, lambda: None))
+        fork(lambda: processes.call_with_stack(2**24, lambda: None))
         """,
     "verified results, after the parent had some": """
         checked = urdfkin.load("ur5")
@@ -113,10 +113,10 @@ CASES = {
         """,
     "a robot, while another thread needs the lock of logging during an import": """
         import logging
-        from urdfkin.system.locks import importing
+        from urdfkin.system.locks import import_lock
         has = threading.Event()
         def work():
-            with importing:
+            with import_lock:
                 has.set()
                 time.sleep(1.0)
                 logging.getLogger("of a module that is imported")

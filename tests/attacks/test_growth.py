@@ -21,7 +21,7 @@ from scripts.check_growth import KINDS
 from scripts.leaks import PARTS
 from tests.reading import tree_of
 from tests.urdf.lint.cases.arm import arm
-from urdfkin.errors import nearest
+from urdfkin.errors import find_similar_names
 from urdfkin.robot import Robot
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, MAX_ERRORS_PER_CODE, Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check_text
@@ -179,8 +179,8 @@ def test_similar_names_and_the_positions_of_many_attributes_are_found_quickly() 
     ]
     known = ["ab" * 60 + str(i) for i in range(100_000)]
     with at_most(ENOUGH):
-        assert len(nearest("ba" * 60, known)) == 3
-    assert nearest("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
+        assert len(find_similar_names("ba" * 60, known)) == 3
+    assert find_similar_names("elbwo", ["shoulder", "elbow", "wrist"]) == ["elbow"]
 
 
 @pytest.mark.long

@@ -230,7 +230,7 @@ def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> 
     robot = gripper(*MIRRORED)
     own = "joint leader ranges over -0.005 to 0.055 m"
     allowed = "its mimic joints are within their limits only for values from -0.005 to 0.005 (f1)"
-    assert f"{own}; {allowed}" in robot._sheet().text()
+    assert f"{own}; {allowed}" in robot._text_document().text()
     kept = [joint["remaining_range"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
     (none,) = range_reductions(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)

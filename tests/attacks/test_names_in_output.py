@@ -25,12 +25,12 @@ from tests.attacks.test_exported_names import code_alone
 from tests.markup import Page
 from urdfkin.dh import DHTable, export
 from urdfkin.dh.parse_table import read_table
-from urdfkin.dh.tree_parameters import document, tree_parameters
+from urdfkin.dh.tree_parameters import make_tree_parameters, tree_document
 from urdfkin.dh.units import Units
 from urdfkin.errors.escape import csv_cell, from_csv_cell, markdown_code, markdown_text
 from urdfkin.errors.escape import latex_text as escaped
 from urdfkin.export import write as code_text
-from urdfkin.export.forms import code_of_chain
+from urdfkin.export.forms import make_chain_code
 from urdfkin.report.compare import compare, markdown_of
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
@@ -177,7 +177,9 @@ def test_a_name_in_markdown_is_one_code_element_or_one_paragraph(kind: str) -> N
 @pytest.mark.parametrize("form", ["markdown", "terminal"])
 def test_a_table_of_the_whole_tree_has_the_same_lines_with_any_names(form: str) -> None:
     texts = [
-        document(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).written(form)
+        tree_document(make_tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).render(
+            form
+        )
         for names in (list(IN_XML.values()), [f"n{k}" for k in range(len(IN_XML))])
     ]
     assert texts[0].count("\n") == texts[1].count("\n")
@@ -195,7 +197,7 @@ def test_a_name_in_latex_has_no_active_character(kind: str) -> None:
 @pytest.mark.parametrize("kind", NAMES)
 def test_code_with_a_proof_is_the_same_with_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
-        written = code_of_chain(table(name), ["placement"], name="chain", verify=False)
+        written = make_chain_code(table(name), ["placement"], name="chain", verify=False)
         words = written.identifiers["q"]
         assert all(re.fullmatch(r"\w+", word, re.ASCII) for word in words)
         found = []

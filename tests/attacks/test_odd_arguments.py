@@ -19,7 +19,7 @@ from tests.urdfs import robot as robot_of
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import LANES
 from urdfkin.robot import Robot
-from urdfkin.robot.trajectory import line
+from urdfkin.robot.trajectory import make_line_trajectory
 
 ODD: dict[str, Any] = {
     "None": None, "a half": 1.5, "zero": 0, "minus one": -1, "text": "2", "a list": [], "a mapping": {},
@@ -135,7 +135,7 @@ def test_an_unusual_argument_of_a_function_gives_a_result_or_an_error_of_urdfkin
 @pytest.mark.parametrize("odd", [key for key in ODD if key != "a half"])
 def test_an_invalid_duration_is_refused(odd: str, robot: Robot) -> None:
     with pytest.raises(urdfkin.InputError):
-        line(robot, robot.neutral(), robot.neutral(), ODD[odd], 5)
+        make_line_trajectory(robot, robot.neutral(), robot.neutral(), ODD[odd], 5)
 
 
 @pytest.mark.slow
@@ -152,13 +152,13 @@ def test_the_number_of_parts_is_limited_by_the_batch_and_the_processors(
 ) -> None:
     # Ten million threads once caused ten million parts, which took 3.5 s.
     counted = []
-    parts = evaluate._parts
+    parts = evaluate._split_rows
 
     def counting(n: int, threads: int) -> list[slice]:
         counted.append(threads)
         return parts(n, threads)
 
-    monkeypatch.setattr(evaluate, "_parts", counting)
+    monkeypatch.setattr(evaluate, "_split_rows", counting)
     q = robot.sample(1000)
     many = robot.jacobian(q, "c", verify=False, threads=10**7)
     np.testing.assert_array_equal(many, robot.jacobian(q, "c", verify=False, threads=1))

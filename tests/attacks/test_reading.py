@@ -22,9 +22,9 @@ from tests.cli.test_check_in_a_repository import commit, git, put
 from urdfkin.errors import SourceError
 from urdfkin.robot.trajectory import read_arrays
 from urdfkin.system import files
-from urdfkin.system.cache import get
-from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
-from urdfkin.system.git import version_before
+from urdfkin.system.cache import read_cached_file
+from urdfkin.system.files import MAX_BYTES, read_bytes, read_if_exists, read_start
+from urdfkin.system.git import merge_base_files
 from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.catalogue import find_package
 from urdfkin.validation.campaign import StoreWarning, validate
@@ -93,7 +93,7 @@ def odd_file(kind: str, path: Path) -> Path:
 def test_a_file_that_is_not_regular_is_refused(kind: str, tmp_path: Path) -> None:
     path = odd_file(kind, tmp_path / "x")
     words = r"not a regular file: found a (character device|pipe)|directory"
-    for read in (read_bytes, read_if_there):
+    for read in (read_bytes, read_if_exists):
         with pytest.raises(SourceError, match=words):
             read(path)
 
@@ -102,7 +102,7 @@ def test_a_file_that_is_too_large_is_refused_with_the_limit(tmp_path: Path) -> N
     path = tmp_path / "sparse"
     with path.open("wb") as file:
         file.truncate(2**40)
-    with pytest.raises(SourceError, match=f"too large: found more than {MOST} bytes"):
+    with pytest.raises(SourceError, match=f"too large: found more than {MAX_BYTES} bytes"):
         read_bytes(path)
     assert read_start(path, 5) == bytes(5)
     with pytest.raises(SourceError, match="too large: found more than 5000 bytes"):
@@ -124,7 +124,7 @@ def test_a_manifest_or_a_cached_file_that_is_a_device_and_an_mjcf_file_that_is_a
     assert find_package("arm", tmp_path / "arm.urdf", {}) is None
     (tmp_path / "kernel").symlink_to("/dev/zero")
     with pytest.warns(UserWarning, match="is damaged and is computed again: a character device"):
-        assert get(tmp_path / "kernel") is None
+        assert read_cached_file(tmp_path / "kernel") is None
     os.mkfifo(tmp_path / "arm.xml")
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 
@@ -173,7 +173,7 @@ def test_the_target_of_a_link_that_replaces_a_lock_or_folder_of_a_store_is_not_c
 def test_arrays_that_unpack_to_more_than_the_limit_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("urdfkin.robot.trajectory.MOST_DATA", 2 * 10**7)
+    monkeypatch.setattr("urdfkin.robot.trajectory.MAX_DATA_BYTES", 2 * 10**7)
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (2**29, 1)})
     with (
@@ -230,11 +230,11 @@ def test_an_older_version_that_is_too_large_is_refused(
     git("init", "-q", "-b", "main")
     arm = tmp_path / put("arm.urdf", "<robot/>" + " " * 1000)
     commit()
-    version = version_before("main", tmp_path)
-    assert version.read(arm) is not None
-    monkeypatch.setattr("urdfkin.system.git.MOST", 1000)
+    version = merge_base_files("main", tmp_path)
+    assert version.read_file(arm) is not None
+    monkeypatch.setattr("urdfkin.system.git.MAX_BYTES", 1000)
     with pytest.raises(SourceError, match=r"arm\.urdf: too large in the older version: found 1008 bytes"):
-        version.read(arm)
+        version.read_file(arm)
 
 
 # -- folders and meshes ---------------------------------------------------------------------------------
@@ -246,7 +246,7 @@ def test_check_of_a_folder_refuses_pipes_and_devices_and_checks_all_other_files(
     (tmp_path / "c.urdf").write_text('<robot name="r"><link name="a"/></robot>')
     begin = time.monotonic()
     done = command("check", str(tmp_path))
-    assert time.monotonic() - begin < files.PATIENCE
+    assert time.monotonic() - begin < files.PIPE_TIMEOUT
     assert done.code == 2
     assert "a.urdf: not a regular file: found a pipe" in done.err
     assert "b.urdf: not a regular file: found a character device" in done.err

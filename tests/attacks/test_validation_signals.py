@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.running import python
-from urdfkin.cli.exit import Stop, stoppable
+from urdfkin.cli.exit import Stop, handle_signals
 
 pytestmark = pytest.mark.long
 
@@ -146,13 +146,13 @@ def test_only_the_first_signal_interrupts_and_the_handlers_are_restored() -> Non
     before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as the command nohup does
-        with stoppable() as stop:
+        with handle_signals() as stop:
             os.kill(os.getpid(), signal.SIGHUP)
         assert stop.signal is None
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
         assert signal.getsignal(signal.SIGTERM) is before[0]
         interrupts = 0
-        with stoppable() as stop:
+        with handle_signals() as stop:
             try:
                 os.kill(os.getpid(), signal.SIGTERM)
             except KeyboardInterrupt:

@@ -48,7 +48,7 @@ def test_a_wheel_at_constant_speed_has_a_constant_rate_for_any_wrapped_log(
     turns = (motion.q[:, 0] - angle) / (2.0 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-9)
     assert "angle jumps by a whole turn after sample" in motion.notes[0]
-    assert "after unwrapping wheel" in motion.rates
+    assert "after unwrapping wheel" in motion.rates_source
 
 
 def test_a_wheel_may_reverse_and_unwrapped_angles_do_not_change(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_a_wheel_may_reverse_and_unwrapped_angles_do_not_change(tmp_path: Path) 
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
     assert motion.notes == ()
-    assert motion.rates == "by central differences"
+    assert motion.rates_source == "by central differences"
 
 
 def test_revolute_joints_and_fast_unwrapped_wheels_do_not_change(tmp_path: Path) -> None:

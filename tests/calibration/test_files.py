@@ -31,7 +31,7 @@ from urdfkin.model.chain import make_chain
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot.loading import load
-from urdfkin.system.files import Edit, edited
+from urdfkin.system.files import Edit, apply_edits
 
 NAMES = ("a", "b")
 Q = np.array([[0.1, 0.2], [0.3, 0.4], [-0.5, 0.6]])
@@ -345,7 +345,7 @@ def test_a_urdf_with_errors_or_without_the_joint_is_not_edited() -> None:
     with pytest.raises(InputError, match="no such joint"):
         with_origins(BRANCHED.encode(), {"five": np.eye(4)})
     with pytest.raises(InputError, match="two edits overlap"):
-        edited(b"abc", [Edit(0, 2), Edit(1, 3)])
+        apply_edits(b"abc", [Edit(0, 2), Edit(1, 3)])
 
 
 angles = st.floats(-7.0, 7.0)

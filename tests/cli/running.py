@@ -16,7 +16,7 @@ import numpy as np
 
 from urdfkin.cli import main
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[s
         f"  seen = sorted({set(modules)!r} & set(sys.modules)) + [f'exit {{end.code}}'] * bool(end.code)\n"
         "  if seen: found[line] = seen\n else: found[line] = ['no exit']\nprint('\\n' + json.dumps(found))"
     )
-    done = subprocess.run(own_python(f"exec({code!r})"), check=True, capture_output=True, text=True)
+    done = subprocess.run(python_command(f"exec({code!r})"), check=True, capture_output=True, text=True)
     found: dict[str, list[str]] = json.loads(done.stdout.splitlines()[-1])
     return found
 

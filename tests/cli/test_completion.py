@@ -17,7 +17,7 @@ import urdfkin as library
 from tests.attacks.hostile import IN_XML, chain_of_all
 from tests.cli.running import python, urdfkin
 from urdfkin.cli import commands
-from urdfkin.dh.parse_table import references
+from urdfkin.dh.parse_table import published_tables
 from urdfkin.kinematics.registry import equations
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint.pages import RULES
@@ -51,7 +51,7 @@ def test_commands_options_choices_codes_equations_and_tables_are_completed(offer
     assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
     assert offered("explain 7.13") == ["7.13", "7.130"]
     assert set(offered("check --ignore ")) == {*RULES, *slugs}
-    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
+    assert set(offered("dh ur5 --compare ")) == {"file", *published_tables()}
     assert offered("check ") == ["file"]
     assert offered("nonsense x") == []
 

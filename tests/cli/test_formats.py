@@ -97,7 +97,7 @@ def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
     parts: list[str | Table | Matrix] = [CodeLine("T(i)"), "", Strong("sure")]
     parts.append(Matrix([["1", "-20"], ["300", "4"]]))
     document = TextDocument("", [*parts, Table(("a_b", "[m]"), [("c_d", -0.5)], names=(0,))])
-    text, markdown, html, latex = (document.written(form) for form in ("table", "markdown", "html", "latex"))
+    text, markdown, html, latex = (document.render(form) for form in ("table", "markdown", "html", "latex"))
     assert text.startswith("T(i)\n\nsure\n    1  -20\n  300    4\na_b   [m]\n")
     assert markdown.startswith("`T(i)`\n\n**sure**\n\n```\n  1  -20\n300    4\n```\n\n| a\\_b |")
     assert "| `c_d` | -0.5 |" in markdown

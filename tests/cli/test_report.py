@@ -11,7 +11,7 @@ from tests.cli import running
 from tests.cli.running import Done
 from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
-from urdfkin.cli.campaign import Pace, line
+from urdfkin.cli.campaign import SpeedEstimator, format_progress
 from urdfkin.validation.collector import CampaignProgress
 
 
@@ -148,16 +148,16 @@ STANDING = CampaignProgress(
 @pytest.mark.parametrize("compiling", [0.0, 90.0])
 def test_stored_chunks_and_compilation_do_not_change_the_reported_speed(compiling: float) -> None:
     now = [100.0]
-    pace = Pace(lambda: now[0])
+    estimator = SpeedEstimator(lambda: now[0])
     now[0] += compiling
-    assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
+    assert estimator.estimate(replace(STANDING, chunks_done=10)) == (None, None)
     now[0] += 5.0
-    assert pace.of(STANDING) == (4.0, 128.5)
-    assert line(STANDING, pace) == (
+    assert estimator.estimate(STANDING) == (4.0, 128.5)
+    assert format_progress(STANDING, estimator) == (
         "2 of 68 robots, 30 of 544 chunks (10 from an earlier run); 4 chunks/s, 2 min 8 s left, none"
         " failed; panda"
     )
-    assert "3 failed" in line(replace(STANDING, failures=3), pace)
+    assert "3 failed" in format_progress(replace(STANDING, failures=3), estimator)
 
 
 def test_json_progress_is_printed_from_the_start_to_the_last_chunk() -> None:
@@ -178,7 +178,7 @@ def test_a_log_gets_progress_lines_at_intervals_and_none_for_a_short_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert "chunks" not in urdfkin("validate planar_two_link --samples 50").err
-    monkeypatch.setattr(campaign, "_LINES", 0.0)
+    monkeypatch.setattr(campaign, "_LINE_INTERVAL", 0.0)
     done = urdfkin("validate planar_two_link --samples 50")
     assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
     assert done.err.endswith("left, none failed; planar_two_link\n")

@@ -14,7 +14,7 @@ from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
 from urdfkin.dh import read_table
-from urdfkin.dh.parse_table import references
+from urdfkin.dh.parse_table import published_tables
 from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
@@ -248,7 +248,7 @@ def test_unusual_robots_are_processed_in_every_format(quantity: str, name: str) 
 
 def test_a_table_can_be_used_as_a_robot_and_an_absent_check_has_a_reason() -> None:
     assert "the check was turned off by verify=False" in urdfkin("jacobian panda --no-verify").text
-    path, q = str(references()["ur5"]), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    path, q = str(published_tables()["ur5"]), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     robot = library.load(read_table(path))
     done = good("jacobian", path, "--q", ",".join(map(str, q)), "--format", "json")
     assert done.data["result"] == [robot.jacobian(q, robot.tip_frame).tolist()]
@@ -355,9 +355,11 @@ def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
     found = urdfkin("placement panda", *words, "--q", "0.1,0.2", "--format", "json").data
-    robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
+    robot = library.load("panda").with_locked_joints(
+        "ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"]
+    )
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
-    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
+    robot = library.load("panda").with_locked_joints({"panda_joint4": -1.0 / 3.0})
     replay = robot.origin.command_line.split()
     assert replay == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
     found = urdfkin("placement", *replay, "--q", "ready", "--format", "json").data

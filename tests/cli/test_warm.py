@@ -57,8 +57,8 @@ def test_after_warm_no_process_is_started_to_compile(monkeypatch: pytest.MonkeyP
     def fail(*_: object, **__: object) -> NoReturn:
         pytest.fail("a process was started")
 
-    monkeypatch.setattr(preload, "_compile_elsewhere", fail)
-    preload.load_kernels()
+    monkeypatch.setattr(preload, "_start_compiler", fail)
+    preload.load_all_kernels()
 
 
 @pytest.mark.long

@@ -86,7 +86,7 @@ def test_within_counts_shifted_zeros_as_written_also_with_different_names(rename
     assert found.up_to == ("zeros",)
     assert headline(a, b).startswith("EQUIVALENT up to zeros")
     assert len(found.links) == 5
-    assert found.written[1] == pytest.approx(1e-3, rel=1e-6)
+    assert found.bound_as_written[1] == pytest.approx(1e-3, rel=1e-6)
     assert not found.within(1e-4)
     assert found.within(1.001e-3)
 

@@ -16,7 +16,7 @@ from tests.comparison.searching import far, searched
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from tests.urdfs import robot as urdf
-from urdfkin.comparison.bounds import Boxes, DistanceSearch, tighten
+from urdfkin.comparison.bounds import BoxBounds, DistanceSearch, tighten
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
@@ -134,13 +134,13 @@ def compare_with_difference_quotients(search: DistanceSearch, frame: FramePair) 
     names, M = bounds_of(search, frame)
     if not np.isfinite(M).all():
         return False
-    boxes = Boxes(search, frame, names)
+    boxes = BoxBounds(search, frame, names)
     c, step = search.random_values(200)[:, boxes.at], 1e-3
     largest = np.zeros_like(M)
     for i in range(len(names)):
         h = step * np.eye(len(names))[i]
-        D, G = boxes.at_middles(c)
-        ahead, behind = boxes.at_middles(c + h), boxes.at_middles(c - h)
+        D, G = boxes.evaluate_at_centers(c)
+        ahead, behind = boxes.evaluate_at_centers(c + h), boxes.evaluate_at_centers(c - h)
         slope = (ahead[0] - behind[0]) / (2.0 * step)
         size = np.abs(G).max() + np.abs(D).max()
         assert np.abs(slope - G[..., i]).max() <= 1e-5 * size + 1e-12
@@ -202,8 +202,8 @@ def test_the_bound_of_a_box_by_first_derivatives_is_not_less_than_the_corners(va
     D, G = rng.normal(size=(50, 3)), rng.normal(size=(50, 3, variables))
     D[0] = 0.0
     h = rng.uniform(0.1, 2.0, variables)
-    boxes = cast(Boxes, SimpleNamespace(at_middles=lambda c: (D, G)))
-    bound = Boxes.bounds(boxes, np.zeros((50, variables)), h)
+    boxes = cast(BoxBounds, SimpleNamespace(evaluate_at_centers=lambda c: (D, G)))
+    bound = BoxBounds.bounds(boxes, np.zeros((50, variables)), h)
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=variables)))
     corners = np.linalg.norm(D[:, np.newaxis] + np.einsum("nij,sj->nsi", G, signs * h), axis=-1).max(axis=1)
     assert (bound >= corners * (1.0 - 1e-12)).all()
@@ -217,13 +217,15 @@ def test_the_bound_of_a_box_by_first_derivatives_is_not_less_than_the_corners(va
 
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.3)])
 def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(tool: tuple[float, ...]) -> None:
-    arm, none = robot("panda"), cast(Boxes, None)  # the point depends on no box
+    arm, none = robot("panda"), cast(BoxBounds, None)  # the point depends on no box
     q, step = arm.sample(5, seed=1), 1e-6
-    p, J = Boxes._origin(none, arm, q, "panda_hand", np.array(tool))
+    p, J = BoxBounds._origin(none, arm, q, "panda_hand", np.array(tool))
     expected = arm.placement(q, "panda_hand") @ [*tool, 1.0]
     np.testing.assert_allclose(p, expected[:, :3], atol=1e-14)
     for i, h in enumerate(step * np.eye(arm.nv)):
-        ahead, behind = (Boxes._origin(none, arm, x, "panda_hand", np.array(tool))[0] for x in (q + h, q - h))
+        ahead, behind = (
+            BoxBounds._origin(none, arm, x, "panda_hand", np.array(tool))[0] for x in (q + h, q - h)
+        )
         np.testing.assert_allclose((ahead - behind) / (2.0 * step), J[..., i], atol=1e-9)
 
 

@@ -20,7 +20,7 @@ from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME
 from urdfkin.comparison.result import Verdict
-from urdfkin.dh import dh_table
+from urdfkin.dh import make_dh_table
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
@@ -95,7 +95,7 @@ def test_a_mimic_joint_with_a_larger_multiplier_is_detected_despite_new_names(na
 @pytest.mark.parametrize("kinds", ["RRRRRR", "PRRRRR", "RRPRRR", "RRRRRP"])
 def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: str, seed: int) -> None:
     tree = elbow(kinds)
-    table = replace(disguised(dh_table(tree, "tip"), seed), base_frame="foot", tip_frame="hand")
+    table = replace(disguised(make_dh_table(tree, "tip"), seed), base_frame="foot", tip_frame="hand")
     joints = [joint.name for joint in tree.joints if joint.kind.nv]
     given = dict(zip(joints, (row.joint for row in table.rows), strict=True))
     found = urdfkin.same(loaded(pairs.bounded(tree)), loaded(table), map=given, bounds=False)
@@ -133,7 +133,7 @@ def test_mirrored_arms_are_distinguished_without_equal_names() -> None:
 
 def test_standard_and_modified_rows_of_one_robot_are_the_same() -> None:
     chain = elbow("RRRRRR")
-    tables = [dh_table(chain, "tip", convention=convention) for convention in ("standard", "modified")]
+    tables = [make_dh_table(chain, "tip", convention=convention) for convention in ("standard", "modified")]
     found = urdfkin.same(*tables)
     assert found, found.differences
     assert all(line.startswith("frame ") for line in found.after)
@@ -185,7 +185,7 @@ def test_free_joints_with_a_different_zero_pose_are_equivalent(kind: str, also: 
     assert found.verdict is Verdict.SAME_AFTER
     assert any("the pose of q[" in line for line in found.after)
     assert moves_alike(found, a, b)
-    assert "within the bounds" in str(found.checked)
+    assert "within the bounds" in str(found.confirmation)
     assert found.as_written is not None
     assert certified(found, a, b)
 

@@ -108,8 +108,8 @@ def test_no_sample_of_two_random_arms_exceeds_a_proven_bound(seed: int) -> None:
     names = set(a.coordinate_names), set(b.coordinate_names)
     # Otherwise, rules connect coordinates with different names.
     if names[0] <= names[1] or names[1] <= names[0]:
-        assert off <= found.written[0] + 1e-9
-        assert turned <= found.written[1] + 3e-7
+        assert off <= found.bound_as_written[0] + 1e-9
+        assert turned <= found.bound_as_written[1] + 3e-7
     assert found.verdict is not Verdict.SAME or off < 1e-9
     assert all(frame.lower <= frame.upper + 1e-12 for frame in found.frames)
     assert found.verdict is Verdict.DIFFERS or recheck(certificate(found), a, b) == []
@@ -159,7 +159,7 @@ def test_the_bound_of_a_box_includes_the_multipliers_of_both_prismatic_mimic_joi
     lever = joint("lever", "revolute", "base", "handle", 'xyz="0 0 9"', more=limit())
     a, b = (built(arm.format(y), rest.format(mimic("lever", m)), lever) for y, m in ((0, 1.0), (-5, 2.0)))
     comparator = Comparator((a, b), {}, bounds=True)
-    written = comparator.as_written(comparator.alignment())
+    written = comparator.align_as_written(comparator.alignment())
     search = comparator.search(written, variables_of(written, comparator.tolerance), as_written=True)
     (frame,) = (one for one in written.frames if a.tree.links[one.a] == "tool")
     q = a.sample(1000, seed=0)
@@ -174,7 +174,7 @@ def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() 
     found = urdfkin.same(a, b)
     off = np.linalg.norm((a.placement([3.0], "tool") - b.placement([3.0], "tool"))[:3, 3])
     assert off > 0.29
-    assert found.written[0] >= off
+    assert found.bound_as_written[0] >= off
     assert not found.within(0.02)
 
 

@@ -57,7 +57,7 @@ def test_a_changed_element_is_named(
 ) -> None:
     text = TEXTS["two revolute"]
     assert text.count(change[0]) == 1
-    monkeypatch.setattr(readers, "_source", lambda _: (text.replace(*change), "urdf"))
+    monkeypatch.setattr(readers, "_library_input", lambda _: (text.replace(*change), "urdf"))
     (found,) = compare_readers(urdfkin.load(text), ["pinocchio"])
     (one,) = found.differences
     assert (one.joint, one.element) == ("j2", element)
@@ -77,7 +77,7 @@ def test_an_added_root_joint_is_no_difference_and_a_locked_joint_is_an_error() -
     assert found.agrees, found
     assert (found.same_order, found.missing) == (True, ())
     with pytest.raises(urdfkin.InputError, match="cannot lock joints"):
-        compare_readers(urdfkin.load(TEXTS["two revolute"]).locked({"j1": 0.1}), ["yourdfpy"])
+        compare_readers(urdfkin.load(TEXTS["two revolute"]).with_locked_joints({"j1": 0.1}), ["yourdfpy"])
 
 
 def test_an_mjcf_file_is_read_by_mujoco_and_by_no_reader_of_urdf(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def from_usd(path: Path, text: str) -> urdfkin.Robot:
 def let_newton_read(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the library read another text than urdfkin has read."""
     path.write_text(text)
-    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    monkeypatch.setattr(readers, "_library_input", lambda _: (str(path), "usd"))
 
 
 def test_a_usd_file_is_read_by_newton_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,17 +203,17 @@ def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not
     poses = [{"base": np.eye(4).tolist()}] * 3
     answer = json.dumps({"joints": ["shoulder"], "poses": poses}).encode()
     monkeypatch.setattr(readers, "version", lambda _: "1.0")
-    monkeypatch.setattr(readers, "ask_python", lambda *_: (answer, 0))
+    monkeypatch.setattr(readers, "run_python", lambda *_: (answer, 0))
     (found,) = compare_readers(robot, ["newton"], samples=2)
     assert found.missing == ("upper", "hand")
 
 
 def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load(TEXTS["mimic"])
-    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
+    monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "its process ended with -11"
-    monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "sleep 20"])
-    monkeypatch.setattr(readers, "_PATIENCE", 0.2)
+    monkeypatch.setattr(readers, "python_command", lambda _: ["/bin/sh", "-c", "sleep 20"])
+    monkeypatch.setattr(readers, "_TIMEOUT", 0.2)
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
 
 

@@ -18,7 +18,7 @@ from tests.comparison import pairs
 from tests.comparison.pairs import certified, changed, files_of, moves_alike, robot, written
 from tests.reading import present
 from tests.urdfs import built, joint, limit, mimic
-from urdfkin.comparison.certificate import SAME, certificate, recheck, words_of
+from urdfkin.comparison.certificate import SAME, certificate, difference_text, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.matcher import MechanismMatcher
 from urdfkin.model.mechanisms.mechanism import Alignment, JointTransform, Mechanism
@@ -37,7 +37,7 @@ def test_a_robot_is_the_same_as_itself_and_pinocchio_finds_no_distance() -> None
     assert found
     assert found.verdict is Verdict.SAME
     assert (found.after, found.differences, found.remarks) == ((), (), ())
-    assert str(found.checked).endswith("finds at most 0 m at 8 configurations, within the bounds")
+    assert str(found.confirmation).endswith("finds at most 0 m at 8 configurations, within the bounds")
     assert found.worst is None
 
 
@@ -446,7 +446,7 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(kind:
         assert remark in [one.words for one in found.remarks]
         assert found.exit_code(strict=True) == 1
         document = certificate(found)
-        assert remark in [words_of(one) for one in document["remarks"]]
+        assert remark in [difference_text(one) for one in document["remarks"]]
         assert recheck(document, a, b) == []
         document["remarks"] = []
         assert recheck(document, a, b) != []

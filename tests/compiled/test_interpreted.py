@@ -16,7 +16,7 @@ import urdfkin
 from scripts.check_bits import WAYS, Subject, differing_interpreted, same
 from tests.cli.running import imported, process, python
 from urdfkin.compiled import preload
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.compiled.python_numbers import Number, fma, sine_cosine
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.model.base_motion import BaseMotion
@@ -35,7 +35,7 @@ NAMES = [pytest.param(name, marks=() if name in _FEW else pytest.mark.slow) for 
 def in_both_ways(compute: Callable[[], FloatArray]) -> list[FloatArray]:
     found = []
     for way in WAYS:
-        with only(way):
+        with use_only(way):
             found.append(compute())
     return found
 
@@ -80,7 +80,7 @@ def test_a_fused_product_is_rounded_once_and_overflows_without_an_error() -> Non
 def test_invalid_numbers_raise_the_same_errors_with_and_without_kernels() -> None:
     robot = urdfkin.load("planar_two_link", verify=False)
     for way in WAYS:
-        with only(way):
+        with use_only(way):
             with pytest.raises(urdfkin.InputError):
                 robot.placement([math.nan, 0.0])
             with pytest.raises(RangeError):
@@ -91,7 +91,7 @@ def test_invalid_numbers_raise_the_same_errors_with_and_without_kernels() -> Non
 def test_a_certificate_does_not_depend_on_the_use_of_kernels() -> None:
     certificates = []
     for way in WAYS:
-        with only(way):
+        with use_only(way):
             robot = urdfkin.load("tiago")  # it has mimic joints
             robot.jacobian(robot.sample(3), robot.link_names[-3:])
             certificates.append(robot.certificate())
@@ -122,27 +122,27 @@ def test_a_single_result_creates_no_cache(tmp_path: Path) -> None:
 @pytest.fixture
 def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     loaded: list[str] = []
-    for name in ("_spent", "_loaded", "_beside"):
+    for name in ("_seconds_spent", "_kernels", "_background"):
         monkeypatch.setattr(preload, name, {})
 
-    def load(name: str, home: str) -> str:
+    def load(name: str, module: str) -> str:
         loaded.append(name)
         return name
 
-    monkeypatch.setattr(preload, "load", load)
+    monkeypatch.setattr(preload, "load_kernel", load)
     yield loaded
-    preload._end_beside()
+    preload._kill_background()
 
 
 def test_a_kernel_on_disk_is_loaded_after_enough_time_was_spent_without_the_kernel(
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(preload, "_on_disk", lambda name: True)
-    assert preload.kernel("jacobians") is None
-    preload.spend("jacobians", 0.9 * preload.LOADING)
-    assert preload.kernel("jacobians") is None
-    assert preload.kernel("placements", more=0.9 * preload.LOADING) is None
-    assert preload.kernel("jacobians", more=0.2 * preload.LOADING) == "jacobians"
+    monkeypatch.setattr(preload, "_is_on_disk", lambda name: True)
+    assert preload.get_kernel("jacobians") is None
+    preload.add_time("jacobians", 0.9 * preload.LOAD_AFTER)
+    assert preload.get_kernel("jacobians") is None
+    assert preload.get_kernel("placements", expected_seconds=0.9 * preload.LOAD_AFTER) is None
+    assert preload.get_kernel("jacobians", expected_seconds=0.2 * preload.LOAD_AFTER) == "jacobians"
     assert unspent == ["jacobians"]
 
 
@@ -150,24 +150,24 @@ def test_a_missing_kernel_is_compiled_in_the_background_and_a_large_batch_does_n
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(preload, "_on_disk", lambda name: False)
+    monkeypatch.setattr(preload, "_is_on_disk", lambda name: False)
 
-    def begin(name: str, home: str) -> bool:
+    def begin(name: str, module: str) -> bool:
         begun.append(name)
         return True
 
-    monkeypatch.setattr(preload, "_compile_beside", begin)
-    assert preload.kernel("jacobians", more=0.9 * preload.COMPILING) is None
+    monkeypatch.setattr(preload, "_compile_in_background", begin)
+    assert preload.get_kernel("jacobians", expected_seconds=0.9 * preload.COMPILE_AFTER) is None
     assert (begun, unspent) == (["jacobians"], [])
-    assert preload.kernel("jacobians", more=preload.COMPILING) == "jacobians"
+    assert preload.get_kernel("jacobians", expected_seconds=preload.COMPILE_AFTER) == "jacobians"
 
 
 def test_without_a_kernel_cache_folder_no_compiling_process_starts(
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(preload, "cache_folder", lambda: None)
-    assert not preload._compile_beside("jacobians", preload.RECURSIONS)
-    assert preload._beside == {}
+    monkeypatch.setattr(preload, "kernel_cache_folder", lambda: None)
+    assert not preload._compile_in_background("jacobians", preload.KERNELS_MODULE)
+    assert preload._background == {}
 
 
 class Started:
@@ -189,22 +189,22 @@ def test_threads_that_need_a_missing_kernel_start_one_compiling_process(
 ) -> None:
     started: list[Started] = []
 
-    def start(names: Sequence[str], home: str) -> Started:
+    def start(names: Sequence[str], module: str) -> Started:
         time.sleep(0.05)  # The other threads arrive while the process starts.
         started.append(Started())
         return started[-1]
 
-    monkeypatch.setattr(preload, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(preload, "_compile_elsewhere", start)
+    monkeypatch.setattr(preload, "kernel_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(preload, "_start_compiler", start)
     together = threading.Barrier(4)
 
     def ask(_: int) -> bool:
         together.wait()
-        return preload._compile_beside("jacobians", preload.RECURSIONS)
+        return preload._compile_in_background("jacobians", preload.KERNELS_MODULE)
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(ask, range(4)))
-    assert list[object](preload._beside.values()) == started
+    assert list[object](preload._background.values()) == started
 
 
 def without_cache(folder: Path) -> dict[str, str]:
@@ -214,10 +214,10 @@ def without_cache(folder: Path) -> dict[str, str]:
 _LONG = """
 import time, urdfkin
 from urdfkin.compiled import preload
-preload.LOADING = preload.BESIDE = 0.0
+preload.LOAD_AFTER = preload.BACKGROUND_AFTER = 0.0
 robot = urdfkin.load("one_link", verify=False)
 robot.placement([0.0])
-process, = preload._beside.values()
+process, = preload._background.values()
 print(process.pid, process.poll(), flush=True)
 """
 
@@ -248,12 +248,12 @@ def test_a_kernel_compiled_in_the_background_is_used_when_it_is_ready(tmp_path: 
 import time
 from urdfkin.compiled import preload
 import urdfkin
-preload.LOADING, preload.COMPILING = 0.05, 1e9
+preload.LOAD_AFTER, preload.COMPILE_AFTER = 0.05, 1e9
 robot = urdfkin.load("one_link", verify=False)
 begin, before = time.perf_counter(), robot.placement([0.5])
-while "placements" not in preload._loaded and time.perf_counter() < begin + 120.0:
+while "placements" not in preload._kernels and time.perf_counter() < begin + 120.0:
     assert (robot.placement([0.5]) == before).all()
-print("placements" in preload._loaded)
+print("placements" in preload._kernels)
 """
     done = python(code, env=without_cache(tmp_path))
     assert (done.stdout, done.stderr) == ("True\n", "")
@@ -265,7 +265,7 @@ def test_after_many_single_calls_the_function_for_single_calls_is_used() -> None
     q, begin = robot.neutral(), time.perf_counter()
     fast: Any = robot._prepare("panda_hand", Reference.LOCAL_WORLD_ALIGNED)
     before = robot.jacobian(q, "panda_hand")
-    fast.wanted = False
+    fast.always_load = False
     while hasattr(fast._jacobian, "func") and time.perf_counter() < begin + 120.0:
         assert (robot.jacobian(q, "panda_hand") == before).all()
     assert not hasattr(fast._jacobian, "func")

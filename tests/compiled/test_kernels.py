@@ -9,8 +9,8 @@ import pytest
 import urdfkin
 from tests.odd_tree import odd_tree, pose, state
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.breakdown import KINDS, acceleration_breakdown
-from urdfkin.compiled.evaluate import accelerations, in_blocks
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS, acceleration_breakdown
+from urdfkin.compiled.evaluate import accelerations, compute_in_blocks
 from urdfkin.compiled.plan import LANES, compile_tree
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.model.base_motion import BaseMotion
@@ -46,7 +46,7 @@ def test_streaming_stores_give_the_same_bits_at_any_address(
     v, a = np.random.default_rng(7).standard_normal((2, n, panda.nv))
     frames = ["panda_hand", "panda_link3"]
     jacobians, accelerations = panda.jacobian(q, frames), panda.acceleration(q, v, a, frames)
-    monkeypatch.setattr(evaluate, "_STREAMED", 0)
+    monkeypatch.setattr(evaluate, "_MIN_BUFFERED_BYTES", 0)
     for threads in (1, 2):
         with _between(jacobians, offset) as out:
             panda.jacobian(q, frames, out=out, threads=threads)
@@ -76,7 +76,7 @@ def test_an_error_in_the_rows_of_any_thread_is_reported() -> None:
         if bad is not None:
             q[bad] = 1.0
         for threads in (1, 2):
-            assert in_blocks(compute, [base, q], out, threads) == int(bad is not None)
+            assert compute_in_blocks(compute, [base, q], out, threads) == int(bad is not None)
             np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 
@@ -129,11 +129,11 @@ def test_scaling_velocity_and_acceleration_scales_each_kind_of_term_by_the_formu
     a[:, slide] *= 3.0
     now = acceleration_breakdown(odd, wrist, q, v, a).terms[:, 2]
     for kind, factor in (("coriolis", 2.0), ("sliding", 3.0)):
-        at = KINDS.index(kind)
+        at = ACCELERATION_KINDS.index(kind)
         assert np.abs(now[:, at] - factor * once[:, at]).max() <= ROOM
         assert once[:, at, :3].all()
     for kind in ("transverse", "centripetal"):
-        assert not now[:, KINDS.index(kind)].any()
+        assert not now[:, ACCELERATION_KINDS.index(kind)].any()
 
 
 def test_the_breakdown_of_an_empty_batch_is_empty(odd: KinematicTree) -> None:

@@ -16,12 +16,12 @@ import pytest
 import urdfkin
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled import evaluate
-from urdfkin.compiled.plan import LANES, CompiledTree, compile_tree, program_of
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.plan import LANES, CompiledTree, compile_program, compile_tree
+from urdfkin.compiled.preload import use_only
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 
 _TRIED = """
 import numba.np.linalg, numpy as np, urdfkin
@@ -36,7 +36,7 @@ print("scipy.linalg" in sys.modules)
 def test_scipy_is_imported_only_for_compiled_code_that_calls_blas() -> None:
     # Compiling imports more modules, so the list is stored here.
     urdfkin.load("one_link", verify=False).prepare("tip").placement(np.zeros(1))
-    done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)
+    done = subprocess.run(python_command(_TRIED), check=True, capture_output=True, text=True)
     assert done.stdout == "False\nTrue\n"
 
 
@@ -139,7 +139,7 @@ def test_a_batch_is_not_read_beyond_the_inputs(name: str) -> None:
     for n in (1, LANES - 1, LANES, LANES + 1, 2 * LANES, 3 * LANES + 5):
         inputs = state(robot, n, 5)
         expected = robot.acceleration(inputs[0], inputs[1], inputs[2], frame, verify=False)
-        with ExitStack() as stack, only("compiled"):
+        with ExitStack() as stack, use_only("compiled"):
             q, v, a = (stack.enter_context(before_closed_memory(x)) for x in inputs)
             found = robot.acceleration(q, v, a, frame, verify=False)
             assert found.tobytes() == expected.tobytes()
@@ -153,10 +153,10 @@ def test_an_unpickled_plan_has_its_own_addresses() -> None:
     q, v, a = state(robot, 21, 4)
     plan = compile_tree(robot.tree, links)
     expected = [evaluate.jacobians(plan, q), evaluate.accelerations(plan, q, v, a)]
-    program = program_of(plan, turned=False)
+    program = compile_program(plan, orientations=False)
     text = pickle.dumps(plan)
     again: CompiledTree = pickle.loads(text)
-    anew = program_of(again, turned=False)
+    anew = compile_program(again, orientations=False)
     assert not set(program.addresses) & set(anew.addresses)
     assert anew.words.tolist() == program.words.tolist()
     assert anew.constants.tolist() == program.constants.tolist()

@@ -17,7 +17,7 @@ import urdfkin
 from tests.cli.running import python
 from tests.laws.subjects import differing, robot_of, state
 from urdfkin import Reference
-from urdfkin.compiled.machine.single import arrays_are_known, one_configuration, single
+from urdfkin.compiled.machine.single import array_layout_is_known, make_single_evaluator, one_configuration
 from urdfkin.compiled.plan import KernelArgs
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
@@ -280,7 +280,9 @@ def test_a_prepared_frame_can_be_sent_to_another_process(tmp_path: Any) -> None:
 def test_a_wrong_number_of_arguments_returns_none(panda: Robot) -> None:
     q, fast = panda.neutral(), panda.prepare(FRAME)
     fast.jacobian(q)
-    compute, task = single("jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference)
+    compute, task = make_single_evaluator(
+        "jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference
+    )
     for arguments in ((), (q,), (q, None, None), (q, q, None), (None, None), (q, q), (None, q)):
         assert compute(*arguments) is None
     assert task[KernelArgs.COUNT] == 0
@@ -289,7 +291,7 @@ def test_a_wrong_number_of_arguments_returns_none(panda: Robot) -> None:
 
 
 def test_the_memory_layout_of_arrays_is_known() -> None:
-    assert arrays_are_known()
+    assert array_layout_is_known()
 
 
 @pytest.mark.parametrize("method", METHODS)

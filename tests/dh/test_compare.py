@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tests.cli.test_dh import run
 from tests.dh.arms import CONVENTIONS, arm, disguised, elbow, published, with_cells
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
-from urdfkin.dh.compare import TableComparison, compare, document
-from urdfkin.dh.convert import serial_tree, to_convention, to_tree
-from urdfkin.dh.parse_table import reference_path, references
+from urdfkin.dh import DHTable, make_dh_table, parse_units, table_from_rows
+from urdfkin.dh.compare import TableComparison, compare, comparison_document
+from urdfkin.dh.convert import make_serial_tree, to_convention, to_tree
+from urdfkin.dh.parse_table import published_tables, reference_path
 from urdfkin.errors import InputError, RangeError
 from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import ASSUMED_LIMIT
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, convention: str) -> None:
     path = make_chain(elbow(), "tip")
-    reference = to_convention(disguised(dh_table(elbow(), "tip"), seed), convention)
+    reference = to_convention(disguised(make_dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
     assert found.exact
     assert found.passes
@@ -46,7 +46,7 @@ def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, conve
 @pytest.mark.parametrize("kinds", ["PRRRRR", "RRPRRR", "RRRRRP", "RPRPRR"])
 def test_tables_with_prismatic_joints_are_fitted(kinds: str) -> None:
     tree = elbow(kinds)
-    found = compare(make_chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
+    found = compare(make_chain(tree, "tip"), disguised(make_dh_table(tree, "tip"), 3))
     assert found.exact
     assert found.differences == ()
 
@@ -56,7 +56,10 @@ def test_the_proven_bound_names_prismatic_joints_without_limits() -> None:
     endless, limit = make_chain(tree, "tip"), Limit(-0.3, 0.2, 1.0, 1.0)
     first, *others = endless.joints
     path = replace(endless, joints=(replace(first, limit=limit), *others))
-    texts = [document(compare(one, dh_table(tree, "tip")), units_of()).text() for one in (path, endless)]
+    texts = [
+        comparison_document(compare(one, make_dh_table(tree, "tip")), parse_units()).text()
+        for one in (path, endless)
+    ]
     assert "proven bound for all joint values within limits: " in texts[0]
     assert "within limits, with j1 within 10 m of zero: " in texts[1]
 
@@ -66,24 +69,24 @@ def test_the_proven_bound_covers_the_assumed_travel_of_a_joint_without_a_range(l
     tree = elbow("RPRRRR")
     first, second, *others = make_chain(tree, "tip").joints
     path = replace(make_chain(tree, "tip"), joints=(first, replace(second, limit=limit), *others))
-    wrong = with_cells(dh_table(tree, "tip"), 0, alpha=dh_table(tree, "tip").rows[0].alpha + 1e-3)
+    wrong = with_cells(make_dh_table(tree, "tip"), 0, alpha=make_dh_table(tree, "tip").rows[0].alpha + 1e-3)
     found = compare(path, wrong, fit=False)
     assert found.condition == f"j2 within {ASSUMED_LIMIT:g} m of zero"
     values = np.zeros((2, 6))
     values[:, 1] = -ASSUMED_LIMIT, ASSUMED_LIMIT
     apart = path.placement(values)[:, :3, 3] - found.reference.placement(values)[:, :3, 3]
-    assert 0.009 < np.linalg.norm(apart, axis=-1).max() <= found.most_metres
+    assert 0.009 < np.linalg.norm(apart, axis=-1).max() <= found.metres_bound
 
 
 def test_rounding_at_the_assumed_travel_is_no_difference_on_a_path_of_millimetres() -> None:
     """The displacement of j6 is up to 10 m, so its rounding error exceeds that of the path's lengths."""
     tree = elbow("RRRRRP")
     joints = [replace(joint, T_parent_joint=shrunk(joint.T_parent_joint)) for joint in tree.joints]
-    small = serial_tree("arm", tree.links, joints)
-    found = compare(make_chain(small, "tip"), dh_table(small, "tip"))
-    assert found.as_written
+    small = make_serial_tree("arm", tree.links, joints)
+    found = compare(make_chain(small, "tip"), make_dh_table(small, "tip"))
+    assert found.is_exact_unfitted
     assert found.exact
-    assert found.written_metres > found.rounding * found.reach
+    assert found.unfitted_metres > found.rounding * found.reach
 
 
 def shrunk(T: FloatArray) -> FloatArray:
@@ -102,7 +105,7 @@ def test_an_arm_with_many_coinciding_axes_agrees_with_an_equivalent_table(seed: 
         rotation("z", -math.pi / 2) @ shift(0.13, 0, 0) @ rotation("x", 7.9e-5) @ shift(0, 0, 0.45),
         kinds="RRRPRR",
     )
-    assert compare(make_chain(tree, "tip"), disguised(dh_table(tree, "tip"), seed)).exact
+    assert compare(make_chain(tree, "tip"), disguised(make_dh_table(tree, "tip"), seed)).exact
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -118,9 +121,9 @@ def test_x_beside_a_prismatic_joint_is_perpendicular_to_both_axes(seed: int) -> 
         kinds="PRRRPR",
         tip=rotation("z", math.pi / 2) @ shift(0.46, 0, 0.45) @ square @ half,
     )
-    reference = disguised(dh_table(tree, "tip"), seed)
+    reference = disguised(make_dh_table(tree, "tip"), seed)
     assert compare(make_chain(tree, "tip"), reference).exact
-    assert dh_table(tree, "tip", like=reference).rows[3].alpha == pytest.approx(reference.rows[3].alpha)
+    assert make_dh_table(tree, "tip", like=reference).rows[3].alpha == pytest.approx(reference.rows[3].alpha)
 
 
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
@@ -128,7 +131,7 @@ def test_x_beside_a_prismatic_joint_is_perpendicular_to_both_axes(seed: int) -> 
 def test_a_table_agrees_with_the_chain_of_the_derivation(tree: KinematicTree, seed: int) -> None:
     path = make_chain(tree, "tip")
     assume(path.reach > 1e-3)
-    found = compare(path, disguised(dh_table(tree, "tip"), seed))
+    found = compare(path, disguised(make_dh_table(tree, "tip"), seed))
     assert found.metres <= 1e-11 * max(found.reference.span, 1.0)
 
 
@@ -142,7 +145,7 @@ WRONG = [pytest.param(*one, marks=() if one in FEW else pytest.mark.long) for on
 
 @pytest.mark.parametrize(("row", "cell"), WRONG, ids=str)
 def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -> None:
-    table = dh_table(elbow(), "tip")
+    table = make_dh_table(elbow(), "tip")
     wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 2e-3})
     found = compare(make_chain(elbow(), "tip"), disguised(wrong, 1))
     assert not found.agrees
@@ -157,7 +160,7 @@ def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -
 
 @pytest.mark.parametrize(("row", "cell"), sorted(FREE))
 def test_a_cell_that_the_fitted_base_or_tool_compensates_is_no_difference(row: int, cell: str) -> None:
-    table = dh_table(elbow(), "tip")
+    table = make_dh_table(elbow(), "tip")
     other = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 0.1})
     assert compare(make_chain(elbow(), "tip"), other).exact
 
@@ -166,7 +169,7 @@ def test_a_table_of_a_different_robot_differs() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     found = compare(make_chain(elbow(), "tip"), other)
     assert not found.agrees
-    assert "DIFFERS" in document(found, units_of()).text()
+    assert "DIFFERS" in comparison_document(found, parse_units()).text()
 
 
 def test_a_table_with_different_joints_is_refused() -> None:
@@ -176,9 +179,11 @@ def test_a_table_with_different_joints_is_refused() -> None:
 
 
 def test_the_text_of_a_comparison_states_row_cell_and_millimetres() -> None:
-    table = dh_table(elbow(), "tip")
+    table = make_dh_table(elbow(), "tip")
     wrong = with_cells(table, 2, a=table.rows[2].a + 3e-4)
-    text = document(compare(make_chain(elbow(), "tip"), wrong), units_of("degrees", "millimetres")).text()
+    text = comparison_document(
+        compare(make_chain(elbow(), "tip"), wrong), parse_units("degrees", "millimetres")
+    ).text()
     assert "Cells that differ (mm, deg)" in text
     rows = [line.split() for line in text.splitlines()]
     assert any(row[:3] == ["3", "j3", "a"] and row[-2:] == ["-0.3", "0.3"] for row in rows)
@@ -188,11 +193,11 @@ def test_the_text_of_a_comparison_states_row_cell_and_millimetres() -> None:
 @pytest.mark.parametrize("size", [1e155, -1e307])
 def test_a_length_whose_square_overflows_is_refused(size: float, cell: str) -> None:
     with pytest.raises(RangeError, match=f"row 3, {cell}"):
-        compare(make_chain(elbow(), "tip"), with_cells(dh_table(elbow(), "tip"), 2, **{cell: size}))
+        compare(make_chain(elbow(), "tip"), with_cells(make_dh_table(elbow(), "tip"), 2, **{cell: size}))
 
 
 def test_a_path_whose_square_overflows_is_refused() -> None:
-    table = dh_table(elbow(), "tip")
+    table = make_dh_table(elbow(), "tip")
     with pytest.raises(RangeError, match="square of this length"):
         compare(make_chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)
 
@@ -233,7 +238,7 @@ def test_the_table_of_a_urdf_agrees_exactly_even_with_nearly_coincident_axes(
     seed: int, convention: str
 ) -> None:
     tree = nearly_coincident(seed)
-    reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
+    reference = to_convention(disguised(make_dh_table(tree, "tip"), seed), convention)
     found = compare(make_chain(tree, "tip"), reference)
     assert found.exact
     assert found.differences == ()
@@ -245,7 +250,7 @@ def test_a_wrong_cell_beside_nearly_coincident_axes_is_detected(seed: int) -> No
     near = shift(1e-6, 0, 0.2) @ rotation("z", 0.4 * seed) @ rotation("x", 1e-5)
     steps = [shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1) @ square, near]
     tree = arm(*steps, shift(0.02, -0.2, 0.1) @ square, kinds="RRRRR", tip=shift(0.1, 0, 0.08))
-    table = dh_table(tree, "tip")
+    table = make_dh_table(tree, "tip")
     wrong = with_cells(table, 1, a=table.rows[1].a + 1e-3)
     found = compare(make_chain(tree, "tip"), disguised(wrong, seed))
     assert not found.agrees
@@ -278,9 +283,9 @@ def test_a_wrong_sign_is_named_alone(name: str) -> None:
     for row, cell, wrong in with_wrong_signs(table):
         found = compare(path, wrong)
         assert named(found) == [(row, cell, getattr(table.rows[row], cell))]
-        assert found.mistakes[0].fitted.count == 0
+        assert found.mistakes[0].fit_changes.count == 0
         assert [(one.row, one.cell) for one in found.differences] == [(row, cell)]
-        assert found.instead == ()
+        assert found.unfitted_differences == ()
         assert not found.passes
 
 
@@ -306,10 +311,10 @@ def test_exchanged_and_reversed_rows_are_named(name: str) -> None:
         assert [(str(one.kind), one.rows) for one in found.mistakes] == [("rows exchanged", (i, j))]
     found = compare(path, replace(table, rows=tuple(reversed(table.rows))))
     assert [str(one.kind) for one in found.mistakes] == ["rows reversed"]
-    assert "the rows in reverse order" in document(found, units_of()).text()
+    assert "the rows in reverse order" in comparison_document(found, parse_units()).text()
 
 
-@pytest.mark.parametrize("name", references())
+@pytest.mark.parametrize("name", published_tables())
 def test_a_correct_table_has_no_mistake(name: str) -> None:
     path, table = published(name)
     found = compare(path, table)
@@ -326,15 +331,18 @@ def test_a_wrong_sign_in_a_table_without_the_tool_is_named() -> None:
     for row, cell, wrong in with_wrong_signs(bare):
         found = compare(path, wrong)
         assert [one[:2] for one in named(found)] == [(row, cell)]
-        assert str(found.mistakes[0].fitted) == "tool"
+        assert str(found.mistakes[0].fit_changes) == "tool"
 
 
 def test_a_table_in_other_frames_warns_that_a_fit_can_hide_a_wrong_sign() -> None:
     path, table = published("kinova")
-    text = document(compare(path, table), units_of()).text()
+    text = comparison_document(compare(path, table), parse_units()).text()
     assert "These changes can hide a wrong sign." in text
     path, table = published("panda")
-    assert "can hide" not in document(compare(path, replace(table, tool=np.eye(4))), units_of()).text()
+    assert (
+        "can hide"
+        not in comparison_document(compare(path, replace(table, tool=np.eye(4))), parse_units()).text()
+    )
 
 
 def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
@@ -344,7 +352,10 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     found = compare(make_chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
-    assert "Each of these changes makes the table right without a fit:" in document(found, units_of()).text()
+    assert (
+        "Each of these changes makes the table right without a fit:"
+        in comparison_document(found, parse_units()).text()
+    )
 
 
 def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:

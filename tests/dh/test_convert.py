@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tests.dh.arms import CONVENTIONS, EPS, error_ratio, with_cells
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
-from urdfkin.dh import convert, dh_table, read_table, table_from_rows, to_convention, to_tree, to_urdf
-from urdfkin.dh.parse_table import references
+from urdfkin.dh import convert, make_dh_table, read_table, table_from_rows, to_convention, to_tree, to_urdf
+from urdfkin.dh.parse_table import published_tables
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import make_chain
@@ -27,7 +27,7 @@ from urdfkin.verify.tables import TableError
 conventions = st.sampled_from(CONVENTIONS)
 ROW = DHRow(0.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j")
 TABLE = DHTable(DHConvention.STANDARD, (ROW,))
-UR5 = references()["ur5"]
+UR5 = published_tables()["ur5"]
 
 
 @pytest.mark.slow
@@ -36,7 +36,7 @@ UR5 = references()["ur5"]
 def test_a_conversion_to_the_other_convention_and_back_gives_an_equal_table(
     tree: Any, convention: str, last: str
 ) -> None:
-    table = dh_table(tree, "tip", convention=convention, last=last)
+    table = make_dh_table(tree, "tip", convention=convention, last=last)
     other = "modified" if convention == "standard" else "standard"
     there = to_convention(table, other)
     back = to_convention(there, convention)
@@ -52,7 +52,7 @@ def test_a_conversion_to_the_other_convention_and_back_gives_an_equal_table(
 def test_a_table_converted_to_a_tree_and_back_gives_the_same_tip_placement(
     tree: Any, convention: str
 ) -> None:
-    table = dh_table(tree, "tip", convention=convention)
+    table = make_dh_table(tree, "tip", convention=convention)
     robot = to_tree(table)
     tip = robot.links[robot.frame_link("tip")]
     q = configurations(robot.nq, 4)
@@ -60,7 +60,7 @@ def test_a_table_converted_to_a_tree_and_back_gives_the_same_tip_placement(
     own = path.coupling.select(robot, q)
     assert set(path.joint_names) == set(table.joint_names)
     expected = table.placement(own[:, [path.joint_names.index(name) for name in table.joint_names]])
-    again = dh_table(robot, tip, convention=convention)
+    again = make_dh_table(robot, tip, convention=convention)
     for found in (TreeOracle(robot).placement(q, tip, robot.links[0]), again.placement(own)):
         assert error_ratio(table, found, expected, own) <= 3.0
 
@@ -74,7 +74,7 @@ STANFORD = [
 
 def test_the_stanford_arm_converted_to_a_tree_and_back_has_the_same_cells() -> None:
     table = table_from_rows(STANFORD, "standard")
-    again = dh_table(to_tree(table), "tip")
+    again = make_dh_table(to_tree(table), "tip")
     np.testing.assert_allclose(
         [row.cells for row in again.rows], [row.cells for row in table.rows], rtol=0, atol=1e-12
     )
@@ -118,7 +118,7 @@ def test_a_urdf_converted_to_a_table_and_back_is_the_same_robot_for_pinocchio(
 ) -> None:
     # Pinocchio replaces an axis by x, y or z, from which it deviates by at most 1e-12.
     assume(not any(0.0 < np.sort(np.abs(joint.axis))[1] < 1e-10 for joint in tree.joints))
-    table = dh_table(tree, "tip", convention=convention)
+    table = make_dh_table(tree, "tip", convention=convention)
     q = configurations(tree.nq, 4)
     before = placements(writer.to_urdf(tree), table.joint_names, q, "tip")
     after = placements(to_urdf(table), table.joint_names, q, to_tree(table).links[-1])
@@ -153,9 +153,9 @@ def test_a_robot_converted_to_a_table_and_back_gives_the_same_placements(
 SLIDING = table_from_rows([[0, "pi/2", 0.3, 0], [0, 0, 0.1, 0, "P"]], "standard")
 
 
-@pytest.mark.parametrize("name", [*references(), "a sliding joint without limits"])
+@pytest.mark.parametrize("name", [*published_tables(), "a sliding joint without limits"])
 def test_a_table_can_be_loaded_as_a_robot(name: str) -> None:
-    table = read_table(references()[name]) if name in references() else SLIDING
+    table = read_table(published_tables()[name]) if name in published_tables() else SLIDING
     robot = load(table)
     q = robot.sample(4)
     np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-14)

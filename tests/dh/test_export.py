@@ -15,7 +15,7 @@ from tests.comparison.pairs import with_joint
 from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift
-from urdfkin.dh import FORMATS, dh_table, export, table_from_rows, units_of
+from urdfkin.dh import FORMATS, export, make_dh_table, parse_units, table_from_rows
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.tree import KinematicTree, Mimic
 from urdfkin.view.dh_drawing import draw_table_svg, row_corners
@@ -48,7 +48,7 @@ CODE = [
 def check(
     form: str, tree: KinematicTree, convention: str, where: Path, samples: int = 5, **options: Any
 ) -> None:
-    table = dh_table(tree, "tip", convention=convention, **options)
+    table = make_dh_table(tree, "tip", convention=convention, **options)
     q = configurations(tree.nq, samples)
     theirs = TreeOracle(tree).placement(q, "tip", "l0")
     try:
@@ -74,14 +74,14 @@ def test_symbolic_matlab_code_agrees_with_pinocchio(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["roboticstoolbox", "ets", "matlab-rst"])
 def test_a_format_without_mimic_joints_refuses_mimic_joints(form: str) -> None:
     with pytest.raises(InputError, match="does not support mimic joints"):
-        export(dh_table(TREES["coupled"], "tip"), form)
+        export(make_dh_table(TREES["coupled"], "tip"), form)
 
 
 def test_beta_is_exported_as_a_separate_transform_and_limits_are_exported() -> None:
-    text = export(dh_table(TREES["nearly parallel"], "tip"), "roboticstoolbox")
+    text = export(make_dh_table(TREES["nearly parallel"], "tip"), "roboticstoolbox")
     assert "ET.Ry(" in text
     assert "DHRobot" not in text
-    assert "rtb.DHRobot(" in export(dh_table(PLAIN_ARM, "tip"), "roboticstoolbox")
+    assert "rtb.DHRobot(" in export(make_dh_table(PLAIN_ARM, "tip"), "roboticstoolbox")
     row = {"a": 1, "alpha": 0, "d": 0, "theta": 0, "limit": {"lower": -1.5, "upper": 2.5}}
     limited = table_from_rows([row, [1, 0, 0, 0]], "standard")
     for form in ("roboticstoolbox", "ets"):
@@ -116,7 +116,7 @@ def test_the_sympy_placement_of_a_table_is_exact() -> None:
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_every_format_names_the_convention_of_the_table(form: str, convention: str) -> None:
-    text = export(dh_table(PLAIN_ARM, "tip", convention=convention), form)
+    text = export(make_dh_table(PLAIN_ARM, "tip", convention=convention), form)
     other = "modified" if convention == "standard" else "standard"
     assert convention in text or form == "matlab-rst"
     assert other not in text
@@ -125,7 +125,7 @@ def test_every_format_names_the_convention_of_the_table(form: str, convention: s
 
 def test_an_unknown_format_lists_similar_names() -> None:
     with pytest.raises(UnknownNameError, match="did you mean markdown"):
-        export(dh_table(PLAIN_ARM, "tip"), "markdwon")
+        export(make_dh_table(PLAIN_ARM, "tip"), "markdwon")
 
 
 ROWS = [[0, 90, 0.3, 0], [0.4, 0, 0, -90], [0, 180, 0.1, 0, "P"]]
@@ -133,7 +133,7 @@ PLAIN = table_from_rows(ROWS, "standard", angles="degrees")
 
 
 def test_the_terminal_table_has_the_documented_layout() -> None:
-    text = export(PLAIN, "terminal", units_of("degrees", "millimetres"))
+    text = export(PLAIN, "terminal", parse_units("degrees", "millimetres"))
     assert text.splitlines() == [
         "robot: base to tip, standard Denavit-Hartenberg parameters",
         "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)",
@@ -158,7 +158,7 @@ def test_the_latex_table_states_the_convention_in_the_caption_and_escapes_names(
 
 
 def test_mimic_joints_are_written_as_expressions_of_the_mimicked_joint() -> None:
-    text = export(dh_table(TREES["coupled"], "tip"), "terminal")
+    text = export(make_dh_table(TREES["coupled"], "tip"), "terminal")
     assert "-0.5 q1 " in text
     assert "with q1 = j1, q2 = j2, q3 = j3" in text
     assert "beta [rad]" in text
@@ -166,7 +166,7 @@ def test_mimic_joints_are_written_as_expressions_of_the_mimicked_joint() -> None
 
 def test_snapped_values_are_listed_with_rows_and_effect() -> None:
     tree = arm(np.eye(4), rotation("x", 1.5708) @ shift(0.3, 0, 0), tip=shift(0.2, 0, 0))
-    text = export(dh_table(tree, "tip", snap=1e-4), "terminal")
+    text = export(make_dh_table(tree, "tip", snap=1e-4), "terminal")
     assert "row 1: origin of j2, turned by 3.67e-06 rad, tip moves by at most 7.35e-07 m" in text
     assert math.isclose(3.6732e-06 * 0.2, 7.3464e-07)
 
@@ -178,7 +178,7 @@ def test_snapped_values_are_listed_with_rows_and_effect() -> None:
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     pytest.importorskip("matplotlib")
-    root = ET.fromstring(draw_table_svg(dh_table(PLAIN_ARM, "tip", convention=convention)))
+    root = ET.fromstring(draw_table_svg(make_dh_table(PLAIN_ARM, "tip", convention=convention)))
     assert root.tag.endswith("svg")
     written = "".join("".join(node.itertext()) for node in root.iter() if node.tag.endswith("text"))
     for name in ("j1", "j2", "j3", "tip", f"{convention} Denavit-Hartenberg frames"):
@@ -190,23 +190,23 @@ def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None
 @pytest.mark.slow
 def test_equal_tables_give_equal_drawings() -> None:
     pytest.importorskip("matplotlib")
-    table = dh_table(arm(LINK, LINK), "tip")
+    table = make_dh_table(arm(LINK, LINK), "tip")
     assert draw_table_svg(table) == draw_table_svg(table)
     assert draw_table_svg(table) != draw_table_svg(table, [0.5, 0.5])
 
 
 def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
     pytest.importorskip("matplotlib")
-    assert "<svg" in draw_table_svg(dh_table(TREES["nothing moves"], "tip"))
+    assert "<svg" in draw_table_svg(make_dh_table(TREES["nothing moves"], "tip"))
     with pytest.raises(InputError, match="needs exactly one configuration"):
-        draw_table_svg(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
+        draw_table_svg(make_dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
 
 
 @pytest.mark.parametrize(("convention", "beta"), [("standard", 0.0), ("standard", 0.3), ("modified", 0.0)])
 def test_the_two_lines_of_a_row_lie_on_the_joint_axis_and_on_the_common_normal(
     convention: str, beta: float
 ) -> None:
-    table = dh_table(arm(LINK, LINK), "tip", convention=convention)
+    table = make_dh_table(arm(LINK, LINK), "tip", convention=convention)
     table = replace(table, rows=tuple(replace(row, beta=beta) for row in table.rows))
     frames = table.frames([0.5, -0.7])
     corners, standard = row_corners(table, frames), convention == "standard"

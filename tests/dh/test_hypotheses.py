@@ -13,9 +13,9 @@ from tests.cli.running import good, refused
 from tests.cli.test_dh import UR5, run
 from tests.dh.arms import CONVENTIONS, elbow, published
 from tests.reading import present
-from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
-from urdfkin.dh.compare import TOLERANCE, diagnose
-from urdfkin.dh.compare.hypotheses import other_interpretations, stated_interpretation, table_warnings
+from urdfkin.dh import DHTable, make_dh_table, read_table, table_from_rows
+from urdfkin.dh.compare import TIP_TOLERANCE, find_better_interpretation
+from urdfkin.dh.compare.hypotheses import find_table_warnings, other_interpretations, parse_interpretation
 from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.units import COLUMNS
 from urdfkin.model.chain import make_chain
@@ -62,7 +62,7 @@ def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(nam
     path, reference = published(name)
     options, words = MISTAKES[mistake]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
-    found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
+    found = present(find_better_interpretation(path, written(reference, wrong, **options), TIP_TOLERANCE))
     assert found.interpretation.differences(found.stated).startswith(words.format(reference.convention))
     assert found.metres <= 5.01e-5
     assert found.interpretation.difference_count(found.stated) <= 4
@@ -72,7 +72,9 @@ def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(nam
 def test_wrong_units_are_named_for_an_arm_with_a_prismatic_joint(kinds: str) -> None:
     tree = elbow(kinds)
     found = present(
-        diagnose(make_chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6)
+        find_better_interpretation(
+            make_chain(tree, "tip"), written(make_dh_table(tree, "tip"), "standard", mm=True), 1e-6
+        )
     )
     assert found.interpretation.differences(found.stated) == "millimetres"
 
@@ -81,8 +83,13 @@ def test_wrong_units_are_named_for_an_arm_with_a_prismatic_joint(kinds: str) -> 
 def test_a_table_of_a_different_robot_fits_no_interpretation() -> None:
     reference = read_table(reference_path("ur3"))
     path = load("ur5").chain("tool0", "base")
-    assert diagnose(path, written(reference, "standard"), TOLERANCE, 0.3) is None
-    assert diagnose(path, written(table_from_rows([[0.1, 0, 0, 0]], "standard"), "standard"), 1e-4) is None
+    assert find_better_interpretation(path, written(reference, "standard"), TIP_TOLERANCE, 0.3) is None
+    assert (
+        find_better_interpretation(
+            path, written(table_from_rows([[0.1, 0, 0, 0]], "standard"), "standard"), 1e-4
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize("rows", [None, 3, ["abc"], [3.0]])
@@ -91,8 +98,8 @@ def test_an_invalid_table_has_no_other_interpretation(rows: Any) -> None:
 
 
 def test_interpretations_with_the_fewest_changes_are_tried_first() -> None:
-    data = written(dh_table(elbow(), "tip"), "standard")
-    stated = stated_interpretation(data)
+    data = written(make_dh_table(elbow(), "tip"), "standard")
+    stated = parse_interpretation(data)
     counts = [other.difference_count(stated) for other, _ in other_interpretations(data)]
     assert counts == sorted(counts)
     assert counts[0] == 1
@@ -116,13 +123,16 @@ def test_a_comparison_names_the_fitting_interpretation_and_exits_with_1(tmp_path
 
 def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:
     deg = {"angles": "degrees"}
-    assert "look like radians" in table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
+    assert (
+        "look like radians"
+        in find_table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
+    )
     metres = table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm")
-    assert "look like metres" in table_warnings(metres)[0]
+    assert "look like metres" in find_table_warnings(metres)[0]
     exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
-    assert "a and alpha look exchanged" in table_warnings(table_from_rows(exchanged, "standard"))[0]
+    assert "a and alpha look exchanged" in find_table_warnings(table_from_rows(exchanged, "standard"))[0]
     for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):
-        assert table_warnings(read_table(reference_path(name))) == []
+        assert find_table_warnings(read_table(reference_path(name))) == []
 
 
 def test_loading_a_table_that_looks_like_millimetres_causes_a_warning() -> None:

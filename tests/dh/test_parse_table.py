@@ -19,24 +19,24 @@ from tests.dh.arms import CONVENTIONS
 from tests.random_chains import trees
 from tests.reading import present
 from urdfkin.dh import (
-    dh_table,
     export,
+    make_dh_table,
+    parse_units,
     read_table,
     table_from_mapping,
     table_from_rows,
     to_convention,
-    units_of,
 )
 from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import (
     is_table_file,
     mapping_from_text,
+    published_tables,
     read_mapping,
     reference_path,
-    references,
     table_from_text,
 )
-from urdfkin.dh.rows import last_digits
+from urdfkin.dh.rows import half_digits_by_row
 from urdfkin.dh.units import InvalidCellError, parse_cell
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.model.tree import KinematicTree
@@ -47,7 +47,7 @@ from urdfkin.robot.loading import load
 @given(trees(), st.sampled_from(CONVENTIONS), st.sampled_from(["toml", "json", "csv"]))
 @settings(max_examples=50)
 def test_a_written_table_is_read_exactly(tree: KinematicTree, convention: str, form: str) -> None:
-    table = dh_table(tree, "tip", convention=convention)
+    table = make_dh_table(tree, "tip", convention=convention)
     again = table_from_text(export(table, form), f".{form}")
     assert again.rows == table.rows
     assert again.convention is table.convention
@@ -140,10 +140,10 @@ def test_the_sign_of_a_joint_variable_is_the_sense_of_the_row() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "csv"])
-@pytest.mark.parametrize("name", references())
+@pytest.mark.parametrize("name", published_tables())
 def test_a_printed_reference_table_is_read_with_the_same_placements(name: str, form: str) -> None:
     table = read_table(reference_path(name))
-    for units in (units_of(), units_of("degrees", "millimetres")):
+    for units in (parse_units(), parse_units("degrees", "millimetres")):
         again = table_from_text(export(table, form, units), SUFFIXES[form])
         for one in ("robot", "base_frame", "tip_frame", "convention"):
             assert getattr(again, one) == getattr(table, one)
@@ -164,8 +164,8 @@ def test_a_robot_with_the_name_robot_is_read_from_a_printed_table() -> None:
 def test_a_printed_table_of_a_random_robot_is_read_with_the_same_placements(
     tree: KinematicTree, convention: str, form: str
 ) -> None:
-    table = dh_table(tree, "tip", convention=convention)
-    again = table_from_text(export(table, form, units_of(digits=17)), SUFFIXES[form])
+    table = make_dh_table(tree, "tip", convention=convention)
+    again = table_from_text(export(table, form, parse_units(digits=17)), SUFFIXES[form])
     assert again.joint_names == table.joint_names
     q = np.linspace(-1, 1, len(table.joint_names))
     np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-8 * max(1.0, table.span))
@@ -189,7 +189,7 @@ def test_every_text_is_a_finite_cell_or_is_refused(text: str) -> None:
 
 def test_the_last_digit_of_a_cell_with_a_unit_is_converted() -> None:
     data = mapping_from_text("a;alpha;d;theta\n311,1 mm;90°;0,25;0\n", ".csv", "sheet")
-    assert last_digits({"convention": "standard", **data})[0] == {
+    assert half_digits_by_row({"convention": "standard", **data})[0] == {
         "a": pytest.approx(5e-5), "alpha": 0.0, "d": pytest.approx(5e-3), "theta": 0.0,
     }  # fmt: skip
 
@@ -550,7 +550,7 @@ def test_any_text_gives_a_table_or_an_error_of_urdfkin(text: str, suffix: str) -
 
 
 def test_the_last_digits_of_every_shipped_reference_table_are_read() -> None:
-    for path in references().values():
-        found = last_digits(read_mapping(path))
+    for path in published_tables().values():
+        found = half_digits_by_row(read_mapping(path))
         assert len(found) == len(read_table(path).rows)
         assert all(0.0 <= half <= 0.05 for row in found for half in row.values())

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from tests.cli.running import good
 from tests.random_chains import trees
 from urdfkin.dh.export.toolboxes import write_screws
-from urdfkin.dh.screws import screws_from, screws_of
+from urdfkin.dh.screws import make_screws, screws_from_rows
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import make_chain
@@ -44,7 +44,7 @@ def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def test_the_screws_of_the_books_ur5_give_the_placement_in_the_book() -> None:
-    arm, q = screws_from(SPACE, M), [0, -np.pi / 2, 0, 0, np.pi / 2, 0]
+    arm, q = screws_from_rows(SPACE, M), [0, -np.pi / 2, 0, 0, np.pi / 2, 0]
     T = np.array([[0, -1, 0, 0.095], [1, 0, 0, 0.109], [0, 0, 1, 0.988], [0, 0, 0, 1.0]])
     np.testing.assert_allclose(arm.placement(q), T, atol=1e-15)
     np.testing.assert_allclose(load(arm).placement(q, "tip"), arm.placement(q), atol=1e-15)
@@ -55,7 +55,7 @@ def test_the_screws_of_the_books_ur5_give_the_placement_in_the_book() -> None:
 @settings(max_examples=20)
 def test_space_and_body_screws_give_the_placements_of_the_chain(tree: KinematicTree) -> None:
     path = make_chain(tree, "tip")
-    screws = screws_of(path)
+    screws = make_screws(path)
     q = np.linspace(-1, 1, len(path.joint_names))
     values = path.coupling.values(q)
     scale = 1e-13 * max(1.0, path.reach + float(path.lengths[0]))
@@ -72,7 +72,7 @@ def test_the_screws_of_a_robot_are_checked_and_can_be_loaded(name: str) -> None:
     again = load(screws)
     assert again.tree.links[0] == robot.base_frame
     own = screws.coupling.select(robot.tree, robot.sample(5, seed=1))
-    free = screws_from(screws.space, screws.M, joints=[joint.name for joint in screws.joints])
+    free = screws_from_rows(screws.space, screws.M, joints=[joint.name for joint in screws.joints])
     found = free.placement(screws.coupling.values(own))
     np.testing.assert_allclose(found, screws.placement(own), atol=1e-14)
 
@@ -101,7 +101,7 @@ def test_a_written_screw_file_can_be_loaded_as_a_robot(form: str, tmp_path: Path
 
 @pytest.mark.slow
 def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
-    arm = screws_from(SPACE, M)
+    arm = screws_from_rows(SPACE, M)
     names: dict[str, Any] = {}
     exec(write_screws(arm, "numpy"), names)
     np.testing.assert_array_equal(names["Slist"], np.transpose(SPACE))
@@ -136,7 +136,7 @@ def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
 )
 def test_an_invalid_screw_is_refused_with_the_reason(screws: Any, home: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        screws_from(screws, home)
+        screws_from_rows(screws, home)
 
 
 def test_an_error_in_a_screw_file_is_reported_with_the_position(tmp_path: Path) -> None:

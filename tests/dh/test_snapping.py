@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from tests.reading import present
-from urdfkin.dh import DHTable, dh_table
+from urdfkin.dh import DHTable, make_dh_table
 from urdfkin.dh.export import export
-from urdfkin.dh.export.text import printed
-from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
+from urdfkin.dh.export.text import measure_printed_table
+from urdfkin.dh.snapping import _make_change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.dh.units import Units
 from urdfkin.model.chain import make_chain
@@ -48,7 +48,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
 @settings(max_examples=50)
 def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: Any, convention: Any) -> None:
     tree = nearly_round(seed, noise)
-    table = dh_table(tree, "tip", convention=convention, snap=3 * noise)
+    table = make_dh_table(tree, "tip", convention=convention, snap=3 * noise)
     assert table.snap is not None
     q = configurations(tree.nq, 40, seed) * 2.0  # also configurations far beyond the limits
     metres, radians = worst(table, tree, q)
@@ -63,7 +63,7 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: 
 def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
     tree: KinematicTree, tolerance: float
 ) -> None:
-    table = dh_table(tree, "tip", snap=tolerance)
+    table = make_dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
     own = make_chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
@@ -79,7 +79,7 @@ def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
 @settings(max_examples=40)
 def test_the_declared_bound_is_at_most_thirty_times_the_measured_error(seed: int) -> None:
     tree = nearly_round(seed, 1e-4, slides=False)
-    snap = present(dh_table(tree, "tip", snap=3e-4).snap)
+    snap = present(make_dh_table(tree, "tip", snap=3e-4).snap)
     assume(snap.metres > 1e-6)
     assert snap.measured_metres <= snap.metres
     assert snap.metres <= 30.0 * snap.measured_metres
@@ -89,7 +89,7 @@ def test_the_declared_bound_is_at_most_thirty_times_the_measured_error(seed: int
 @given(st.integers(0, 10_000))
 @settings(max_examples=30)
 def test_angles_close_to_multiples_of_fifteen_degrees_are_snapped(seed: int) -> None:
-    table = dh_table(nearly_round(seed, 1e-6), "tip", snap=1e-4)
+    table = make_dh_table(nearly_round(seed, 1e-6), "tip", snap=1e-4)
     for row in table.rows:
         for angle in (row.alpha, row.theta):
             # Between skew axes at round angles, theta can have any value; cells near a round value are exact.
@@ -100,7 +100,9 @@ def test_angles_close_to_multiples_of_fifteen_degrees_are_snapped(seed: int) -> 
 
 @pytest.mark.parametrize("tilt", [0.0, 2e-3])
 def test_snapping_changes_no_exact_right_angle_and_no_angle_beyond_the_tolerance(tilt: float) -> None:
-    table = dh_table(arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", math.pi / 2 + tilt)), "tip", snap=1e-3)
+    table = make_dh_table(
+        arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", math.pi / 2 + tilt)), "tip", snap=1e-3
+    )
     snap = present(table.snap)
     assert table.rows[0].alpha == pytest.approx(math.pi / 2 + tilt)
     assert (snap.changes, snap.metres, snap.radians) == ((), 0.0, 0.0)
@@ -113,8 +115,8 @@ OFF = 1e-5
 
 
 def test_the_tip_movement_of_a_change_is_the_angle_times_the_lever() -> None:
-    assert SnapChange(0, "origin of a", 1e-3, 4.0).tip == 4e-3
-    assert SnapChange(0, "origin of a", 1e-3, 0.0).tip == 0.0
+    assert SnapChange(0, "origin of a", 1e-3, 4.0).tip_displacement == 4e-3
+    assert SnapChange(0, "origin of a", 1e-3, 0.0).tip_displacement == 0.0
 
 
 def test_the_lever_of_a_snapped_angle_is_the_length_of_the_remaining_chain() -> None:
@@ -122,7 +124,7 @@ def test_the_lever_of_a_snapped_angle_is_the_length_of_the_remaining_chain() -> 
         bent = (rotation("x", math.pi / 2 + tilt) for tilt in (first, last))
         steps = (way @ turn for way, turn in zip((shift(0, 0, 1.0), shift(3.0, 0, 0)), bent, strict=True))
         tree = arm(np.eye(4), *steps, tip=shift(0, 0.5, 0))
-        snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
+        snap = present(make_dh_table(tree, "tip", snap=10 * OFF).snap)
         assert snap.radians == pytest.approx(OFF, rel=1e-9)
         assert snap.metres == pytest.approx(OFF * lever, rel=1e-9)
         assert 0.0 < snap.measured_metres <= snap.metres
@@ -133,7 +135,7 @@ def test_the_lever_of_two_combined_fixed_angles_begins_at_the_next_joint(beyond:
     """Neither angle is nearly round, but their sum is."""
     bolt, turned = rotation("x", 0.3), rotation("x", math.pi / 2 - 0.3 + OFF)
     tree = arm(np.eye(4), bolt, turned, shift(beyond, 0, 0), kinds="RFRR", tip=shift(0, 0.5, 0))
-    snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
+    snap = present(make_dh_table(tree, "tip", snap=10 * OFF).snap)
     assert [change.lever for change in snap.changes] == [pytest.approx(beyond + 0.5)]
     assert snap.metres == pytest.approx(OFF * (beyond + 0.5), rel=1e-9)
     assert 0.0 < snap.measured_metres <= snap.metres
@@ -159,7 +161,7 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
     ],
 )
 def test_the_travel_of_a_prismatic_joint_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
-    snap = present(dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
+    snap = present(make_dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
     assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
     assert 0.0 < snap.measured_metres <= snap.metres
@@ -169,7 +171,7 @@ def test_the_travel_of_a_prismatic_joint_lengthens_the_lever(limit: Limit | None
 @pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "sympy", "json", "toml"])
 def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without_limits(form: str) -> None:
     endless, limited = (
-        export(dh_table(sliding(limit), "tip", snap=10 * OFF), form)
+        export(make_dh_table(sliding(limit), "tip", snap=10 * OFF), form)
         for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
     )
     condition = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
@@ -179,7 +181,7 @@ def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without
 
 def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_without_limits() -> None:
     endless, limited = (
-        printed(dh_table(sliding(limit, 0.1), "tip"), Units(digits=3))
+        measure_printed_table(make_dh_table(sliding(limit, 0.1), "tip"), Units(digits=3))
         for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
     )
     assert str(endless).endswith(f"m; this holds if joints without limits travel at most {ASSUMED_LIMIT:g} m")
@@ -196,7 +198,9 @@ def test_the_bound_of_printed_digits_covers_a_small_multiplier_of_a_mimic_rule(b
         (z_joint("small", ahead, limit=Limit(-0.11, 0.11, 1.0, 1.0), mimic=rule), "a", "b"),
         (z_joint("end", ahead, JointKind.FIXED), "b", "tip"),
     ]
-    found = printed(dh_table(build_tree("arm", "base", joints), "tip", base), Units(digits=15))
+    found = measure_printed_table(
+        make_dh_table(build_tree("arm", "base", joints), "tip", base), Units(digits=15)
+    )
     assert 0.0 < found.metres <= present(found.bound)
 
 
@@ -210,7 +214,7 @@ def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:
 def test_the_bounds_per_metre_of_a_prismatic_joint_are_summed_over_changes() -> None:
     slide = shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF)
     tree = arm(rotation("x", math.pi / 2 + OFF), slide, kinds="RP")
-    snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
+    snap = present(make_dh_table(tree, "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"j2": pytest.approx(3 * OFF, rel=1e-9)}
 
 
@@ -227,15 +231,17 @@ def test_a_snapped_pose_rotates_by_at_most_the_reported_angle(tilt: float, psi: 
 @pytest.mark.parametrize(("convention", "row"), [("standard", 0), ("modified", 1)])
 def test_the_row_of_a_constant_depends_on_the_convention(convention: str, row: int) -> None:
     tree = arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", 1.0), tip=shift(0.1, 0.2, 0) @ rotation("y", 0.3))
-    table = dh_table(tree, "tip", convention=convention)
+    table = make_dh_table(tree, "tip", convention=convention)
     assert [row_of_constant(table, k) for k in range(3)] == [-1, row, 2]
     plain = replace(table, tool=np.eye(4))
     assert [row_of_constant(plain, k) for k in range(3)] == [-1, row, 1]
 
 
-@pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
-def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, sliders: str) -> None:
+@pytest.mark.parametrize(
+    ("pivot", "prismatic_joints"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")]
+)
+def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, prismatic_joints: str) -> None:
     path = make_chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
-    found = _change(path, pivot, "something", OFF)
-    assert found.sliders == tuple(sliders.split())
+    found = _make_change(path, pivot, "something", OFF)
+    assert found.prismatic_joints == tuple(prismatic_joints.split())
     assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])

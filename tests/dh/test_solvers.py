@@ -16,8 +16,8 @@ from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import DHTable, export, table_from_rows, to_tree
 from urdfkin.dh.export.toolboxes import write_screws
-from urdfkin.dh.screws import screws_of
-from urdfkin.dh.structure import Structure, opw_of, structure
+from urdfkin.dh.screws import make_screws
+from urdfkin.dh.structure import Structure, find_opw, find_structure
 from urdfkin.errors import InputError
 from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -33,7 +33,7 @@ PUMA: list[list[float]] = [
 
 
 def of_tree(tree: KinematicTree) -> Structure:
-    return structure(screws_of(make_chain(tree, "tip")))
+    return find_structure(make_screws(make_chain(tree, "tip")))
 
 
 def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:
@@ -46,7 +46,7 @@ def test_a_puma_has_a_spherical_wrist_and_can_be_solved_by_opw() -> None:
     assert found.freedoms == 6
     assert found.solvers[0].startswith("OPW")
     links = 0.4318 + math.hypot(0.0203, 0.15005) + 0.4318
-    assert found.reached <= found.reach == pytest.approx(links, abs=0.02)
+    assert found.sampled_reach <= found.reach == pytest.approx(links, abs=0.02)
 
 
 FIRST_AXIS = "the point of the first axis that is nearest to the"
@@ -73,7 +73,7 @@ def test_the_point_from_which_the_reach_is_measured_is_stated(
     found = of_tree(arm(*poses[: len(kinds)], kinds=kinds, tip=shift(0.1, 0.2, 0.3)))
     assert found.reach_from == pytest.approx(point, abs=1e-12)
     assert found.reach_point == words
-    assert found.reached <= found.reach
+    assert found.sampled_reach <= found.reach
 
 
 def test_the_command_states_the_point_from_which_the_reach_is_measured() -> None:
@@ -121,7 +121,7 @@ def test_a_scara_and_a_gantry_are_recognised() -> None:
 def test_the_centre_of_a_spherical_joint_does_not_move_according_to_pinocchio(name: str) -> None:
     robot = load(name)
     screws = robot.screws()
-    found = structure(screws)
+    found = find_structure(screws)
     assert len(found.joints) - found.freedoms == (1 if name != "kinova" else 0)
     kind = next(kind for kind in found.kinds if kind.name.startswith("spherical"))
     assert kind.at is not None
@@ -182,7 +182,7 @@ def test_the_opw_parameters_of_a_random_arm_are_identified(seed: int) -> None:
     signs = [int(s) for s in rng.choice([-1, 1], 6)]
     robot = load(table(lengths, list(rng.uniform(-3, 3, 6)), signs), verify=False)
     path = robot.chain("tip", "base")
-    found = opw_of(path)
+    found = find_opw(path)
     q = rng.uniform(-3, 3, (50, 6))
     np.testing.assert_allclose(found.placement(q), path.placement(q), atol=1e-12)
     ours, theirs = ({name: abs(x) for name, x in each.items()} for each in (found.lengths, lengths))
@@ -195,8 +195,8 @@ def test_a_calibrated_arm_is_an_opw_arm_only_within_a_tolerance() -> None:
     lengths = dict(zip(NAMES, (0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))
     path = load(table(lengths, [0.0] * 6, [1] * 6, tilt=2e-3), verify=False).chain("tip", "base")
     with pytest.raises(InputError, match=r"not ortho-parallel.*error of [0-9.]+ mm and 0.00[0-9]+ rad"):
-        opw_of(path)
-    found = opw_of(path, 0.02)
+        find_opw(path)
+    found = find_opw(path, 0.02)
     assert found.lengths["c2"] == pytest.approx(0.5, abs=1e-3)
 
 
@@ -204,7 +204,7 @@ def test_a_calibrated_arm_is_an_opw_arm_only_within_a_tolerance() -> None:
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_an_arm_that_is_not_an_opw_arm_is_refused(name: str) -> None:
     with pytest.raises(InputError, match=r"OPW arm must have six|not ortho-parallel"):
-        opw_of(load(name, verify=False).chain())
+        find_opw(load(name, verify=False).chain())
 
 
 @pytest.mark.slow
@@ -236,8 +236,8 @@ def check(robot: Robot, tip: str, solve: Solve) -> None:
     for q, T in zip(*poses(robot, tip), strict=True):
         found = np.array(solve(T)).reshape(-1, 6)
         assert len(found) > 0
-        reached = robot.relative_placement(found, tip, robot.base_frame)
-        np.testing.assert_allclose(reached, np.broadcast_to(T, (len(found), 4, 4)), atol=1e-10)
+        sampled_reach = robot.relative_placement(found, tip, robot.base_frame)
+        np.testing.assert_allclose(sampled_reach, np.broadcast_to(T, (len(found), 4, 4)), atol=1e-10)
         apart = np.abs(np.angle(np.exp(1j * (found - q)))).max(axis=-1)
         assert apart.min() < 1e-7
 
@@ -265,7 +265,7 @@ def eaik_solver(robot: Robot, tip: str) -> Solve:
 
 def ik_geo_solver(robot: Robot, tip: str) -> Solve:
     ik_geo, given = pytest.importorskip("ik_geo"), axes(robot, tip)
-    (family,) = re.findall(r"ik-geo's (\w+)", " ".join(structure(robot.screws(tip)).solvers))
+    (family,) = re.findall(r"ik-geo's (\w+)", " ".join(find_structure(robot.screws(tip)).solvers))
     solver = getattr(ik_geo.Robot, family)(given["H"].tolist(), given["P"].tolist())
 
     def solve(T: FloatArray) -> list[Any]:
@@ -280,7 +280,7 @@ def opw_solver(robot: Robot, tip: str) -> Solve:
     opw = pytest.importorskip("py_opw_kinematics")
     from scipy.spatial.transform import RigidTransform
 
-    found = opw_of(robot.chain(tip, robot.base_frame), 1e-9)
+    found = find_opw(robot.chain(tip, robot.base_frame), 1e-9)
     model = opw.KinematicModel(
         **found.lengths, offsets=found.offsets, flip_axes=tuple(sign < 0 for sign in found.signs)
     )
@@ -319,5 +319,5 @@ def test_the_robotics_toolbox_solves_inverse_kinematics_with_the_exported_ets() 
     q, wanted = poses(robot, "tool0", 5)
     for start, T in zip(q, wanted, strict=True):
         found = scope["ets"].ik_LM(T, q0=start + 0.1, tol=1e-20)
-        reached = robot.relative_placement(found[0], "tool0", robot.base_frame)
-        np.testing.assert_allclose(reached, T, atol=1e-8)
+        sampled_reach = robot.relative_placement(found[0], "tool0", robot.base_frame)
+        np.testing.assert_allclose(sampled_reach, T, atol=1e-8)

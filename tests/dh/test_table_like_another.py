@@ -13,10 +13,10 @@ from tests.cli.running import good, refused
 from tests.cli.test_dh import run
 from tests.dh.arms import CONVENTIONS, arm, disguised, elbow, with_cells
 from tests.random_chains import TURNS, configurations, rotation, shift, trees
-from urdfkin.dh import DHConvention, DHTable, dh_table, export, read_table, table_from_rows, units_of
+from urdfkin.dh import DHConvention, DHTable, export, make_dh_table, parse_units, read_table, table_from_rows
 from urdfkin.dh.compare import compare
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
+from urdfkin.dh.parse_table import published_tables, read_mapping, reference_path, suggest_published_tables
 from urdfkin.errors import InputError
 from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -28,8 +28,8 @@ from urdfkin.robot.loading import load
 @pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR"])
 def test_a_table_like_an_equivalent_table_has_the_cells_of_that_table(seed: int, kinds: str) -> None:
     tree = elbow(kinds)
-    reference = disguised(dh_table(tree, "tip"), seed)
-    table = dh_table(tree, "tip", like=reference)
+    reference = disguised(make_dh_table(tree, "tip"), seed)
+    table = make_dh_table(tree, "tip", like=reference)
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         free = {"theta"} if row.kind.turns else {"d"}  # this table has the URDF's zeros
         free |= {0: {"d"}, 5: {"a", "alpha", "d"}}.get(i, set())
@@ -47,8 +47,8 @@ def test_a_table_like_an_equivalent_table_has_the_cells_of_that_table(seed: int,
 @settings(max_examples=25)
 def test_a_table_like_another_agrees_with_the_urdf_within_rounding(tree: KinematicTree, seed: int) -> None:
     for convention in CONVENTIONS:
-        reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
-        table = dh_table(tree, "tip", convention=convention, like=reference)
+        reference = to_convention(disguised(make_dh_table(tree, "tip"), seed), convention)
+        table = make_dh_table(tree, "tip", convention=convention, like=reference)
         q = np.linspace(-1, 1, len(table.rows))
         apart = np.abs(table.placement(q) - make_chain(tree, "tip").placement(q)).max()
         assert apart <= 20 * float(table.rounding(q)) + 1e-13
@@ -59,8 +59,8 @@ def test_the_zero_of_a_prismatic_joint_may_be_in_d_of_a_coaxial_revolute_joint(t
     rows = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, "P"], [0.0, twist, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
     tree = load(table_from_rows(rows, "standard")).tree
     tip = tree.links[-1]
-    reference = disguised(dh_table(tree, tip), 0)
-    table = dh_table(tree, tip, like=reference)
+    reference = disguised(make_dh_table(tree, tip), 0)
+    table = make_dh_table(tree, tip, like=reference)
     for row, other in zip(table.rows[:3], reference.rows, strict=False):
         assert (row.a, row.alpha, row.beta) == pytest.approx((other.a, other.alpha, other.beta))
     assert table.rows[2].d == reference.rows[2].d
@@ -69,7 +69,7 @@ def test_the_zero_of_a_prismatic_joint_may_be_in_d_of_a_coaxial_revolute_joint(t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(set(references()) - {"kinova"}))
+@pytest.mark.parametrize("name", sorted(set(published_tables()) - {"kinova"}))
 def test_a_table_like_a_vendors_table_has_every_cell_of_that_table(name: str) -> None:
     data, reference = read_mapping(reference_path(name)), read_table(reference_path(name))
     ends = (reference.tip_frame, reference.base_frame, str(reference.convention))
@@ -83,7 +83,7 @@ def test_a_table_like_a_vendors_table_has_every_cell_of_that_table(name: str) ->
 def test_a_table_like_kinovas_has_kinovas_zeros_and_the_lengths_of_the_urdf() -> None:
     reference = read_table(reference_path("kinova"))
     table = load("kinova").dh(reference.tip_frame, reference.base_frame, like=reference, snap=1e-9)
-    text = export(table, "terminal", units_of("degrees", "millimetres"))
+    text = export(table, "terminal", parse_units("degrees", "millimetres"))
     assert "-q1 + 180" in text
     assert "q2 - 90" in text
     for row, other in zip(table.rows, reference.rows, strict=True):
@@ -95,16 +95,16 @@ def test_a_table_like_kinovas_has_kinovas_zeros_and_the_lengths_of_the_urdf() ->
 def test_a_reference_table_of_a_different_robot_is_refused() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     with pytest.raises(InputError, match=r"a different robot.*use --compare to see the differences"):
-        dh_table(elbow(), "tip", like=other)
+        make_dh_table(elbow(), "tip", like=other)
     with pytest.raises(InputError, match="the table and the path have different joints"):
-        dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
+        make_dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_the_option_sign_makes_a_or_alpha_nonnegative(convention: str) -> None:
     inner = slice(0, 5) if convention == "standard" else slice(1, 6)
-    by_a = dh_table(elbow(), "tip", convention=convention, sign="a").rows[inner]
-    by_alpha = dh_table(elbow(), "tip", convention=convention, sign="alpha").rows[inner]
+    by_a = make_dh_table(elbow(), "tip", convention=convention, sign="a").rows[inner]
+    by_alpha = make_dh_table(elbow(), "tip", convention=convention, sign="alpha").rows[inner]
     assert all(row.a >= 0 for row in by_a)
     assert all(row.alpha >= 0 for row in by_alpha)
     assert any(row.alpha < 0 for row in by_a)
@@ -115,7 +115,7 @@ def test_the_option_sign_makes_a_or_alpha_nonnegative(convention: str) -> None:
 @pytest.mark.parametrize("kinds", ["RRRRRR", "PRRRRR", "RRPRRR", "RRRRRP"])
 def test_tables_with_craigs_first_row_and_minimal_prismatic_rows_are_exact(kinds: str, sign: str) -> None:
     tree = elbow(kinds)
-    table = dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
+    table = make_dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
     assert (table.rows[0].d, table.rows[0].theta) == (0.0, 0.0)
     q = configurations(6)
     np.testing.assert_allclose(table.placement(q), make_chain(tree, "tip").placement(q), atol=1e-13)
@@ -126,7 +126,7 @@ def test_a_minimal_prismatic_row_has_a_equal_to_zero() -> None:
         shift(0, 0, 0.3), shift(0.2, 0.1, 0) @ rotation("x", 1.2), shift(0.3, 0.2, 0.1) @ rotation("y", 0.7),
         kinds="RPR", tip=shift(0.1, 0, 0.2),
     )  # fmt: skip
-    drawn, minimal = (dh_table(tree, "tip", slide=slide) for slide in ("drawn", "minimal"))
+    drawn, minimal = (make_dh_table(tree, "tip", slide=slide) for slide in ("drawn", "minimal"))
     assert drawn.rows[1].a > 0.1
     assert minimal.rows[1].a == 0.0
 
@@ -146,14 +146,14 @@ def test_columns_are_printed_in_the_requested_order() -> None:
 
 @pytest.mark.slow
 def test_a_hint_names_the_published_table_of_a_robot() -> None:
-    assert published("xarm7") == [
+    assert suggest_published_tables("xarm7") == [
         "published modified table of this robot: --like xarm7_modified --snap 1e-04",
         "published standard table of this robot: --like xarm7_standard --snap 1e-04",
     ]
-    assert published("nobody") == []
+    assert suggest_published_tables("nobody") == []
     assert "hint: published standard table of this robot: --like ur5" in run("ur5").text
     assert "published" not in run("ur5", "--like", "ur5").text
-    for name in references():
+    for name in published_tables():
         assert DHConvention(read_mapping(reference_path(name))["convention"])
 
 
@@ -230,8 +230,8 @@ def arms_with_a_slide(draw: st.DrawFn) -> KinematicTree:
 def test_a_shifted_zero_of_one_prismatic_joint_is_no_difference_within_rounding(
     tree: KinematicTree, seed: int
 ) -> None:
-    reference = disguised(dh_table(tree, "tip"), seed)
-    table = dh_table(tree, "tip", like=reference)
+    reference = disguised(make_dh_table(tree, "tip"), seed)
+    table = make_dh_table(tree, "tip", like=reference)
     assert is_the_urdf(table, tree)
     assert max(differences(table, reference).values()) <= EXACT
 
@@ -242,8 +242,8 @@ def test_a_shifted_zero_of_one_prismatic_joint_is_no_difference_within_rounding(
 def test_shifted_zeros_of_prismatic_joints_are_no_difference_in_any_convention(
     tree: Any, seed: int, there: str, here: str
 ) -> None:
-    reference = disguised(dh_table(tree, "tip"), seed)
-    table = dh_table(tree, "tip", convention=here, like=to_convention(reference, there))
+    reference = disguised(make_dh_table(tree, "tip"), seed)
+    table = make_dh_table(tree, "tip", convention=here, like=to_convention(reference, there))
     assert table.convention == here
     assert is_the_urdf(table, tree)
     assert max(differences(to_convention(table, "standard"), reference).values()) <= SAME
@@ -269,11 +269,11 @@ def along_slides(reference: DHTable) -> list[int]:
 def test_a_length_along_a_prismatic_joint_may_be_in_d_of_either_row(
     tree: KinematicTree, seed: int, moved: float
 ) -> None:
-    reference = disguised(dh_table(tree, "tip"), seed)
+    reference = disguised(make_dh_table(tree, "tip"), seed)
     assume(beside := along_slides(reference))
     i = beside[seed % len(beside)]
     reference = with_cells(reference, i, d=reference.rows[i].d + moved)
-    table = dh_table(tree, "tip", like=reference)
+    table = make_dh_table(tree, "tip", like=reference)
     assert is_the_urdf(table, tree)
     assert max(differences(table, reference).values()) <= SAME
 
@@ -284,10 +284,10 @@ def test_a_length_along_a_prismatic_joint_may_be_in_d_of_either_row(
 def test_a_changed_cell_without_a_difference_leaves_the_robot_the_same(
     tree: Any, seed: int, data: Any
 ) -> None:
-    reference = disguised(dh_table(tree, "tip"), seed)
+    reference = disguised(make_dh_table(tree, "tip"), seed)
     cells = sorted(differences(reference, reference))
     i, cell = data.draw(st.sampled_from([one for one in cells if one[1] != "beta"]))
     changed = with_cells(reference, i, **{cell: getattr(reference.rows[i], cell) + CHANGE})
-    if max(differences(dh_table(tree, "tip", like=changed), changed).values()) < 0.5 * CHANGE:
+    if max(differences(make_dh_table(tree, "tip", like=changed), changed).values()) < 0.5 * CHANGE:
         judged = compare(make_chain(tree, "tip"), changed)
         assert judged.metres + judged.radians <= SAME

@@ -14,8 +14,8 @@ from tests.laws.subjects import state
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import c, compiled_frame
-from urdfkin.export.code import exported
-from urdfkin.export.compiled_frame import NoCompilerError, library
+from urdfkin.export.code import exportable_quantities
+from urdfkin.export.compiled_frame import NoCompilerError, load_library
 from urdfkin.model.tree import freeze
 from urdfkin.robot import Robot
 from urdfkin.verify.certificate import VerificationError
@@ -30,9 +30,9 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 @pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle"])
 def test_compiled_results_agree_with_pinocchio_and_are_equal_in_single_calls_and_batches(name: str) -> None:
     robot = urdfkin.load("panda" if name == "panda" else urdf_of(name))
-    fast = robot.compiled(robot.tip_frame, "local_world_aligned")
+    fast = robot.compile(robot.tip_frame, "local_world_aligned")
     inputs = state(robot, 37, 5)
-    asked = exported() if name == "panda" else [quantity("jacobian"), quantity("acceleration")]
+    asked = exportable_quantities() if name == "panda" else [quantity("jacobian"), quantity("acceleration")]
     for row in asked:
         given = inputs[: len(row.inputs)]
         found = getattr(fast, row.method)(*given)
@@ -52,7 +52,7 @@ def arm() -> Robot:
 
 
 def test_a_compiled_frame_accepts_any_batch_shape_and_writes_into_out(arm: Robot) -> None:
-    fast, frame = arm.compiled(arm.tip_frame), arm.tip_frame
+    fast, frame = arm.compile(arm.tip_frame), arm.tip_frame
     q = np.linspace(-1.0, 1.0, 24).reshape(3, 4, 2)
     expected = arm.jacobian(q, frame)
     assert np.abs(fast.jacobian(q) - expected).max() < 1e-15
@@ -69,7 +69,7 @@ def test_a_compiled_frame_accepts_any_batch_shape_and_writes_into_out(arm: Robot
 
 
 def test_results_of_a_large_batch_equal_those_of_small_batches_at_any_alignment_of_out(arm: Robot) -> None:
-    fast, n = arm.compiled(arm.tip_frame), 30_000  # results of 2.9 MB
+    fast, n = arm.compile(arm.tip_frame), 30_000  # results of 2.9 MB
     q = arm.sample(n, seed=3)
     expected = np.concatenate([fast.jacobian(q[i : i + 1000]) for i in range(0, n, 1000)])
     for first in range(8):
@@ -80,7 +80,7 @@ def test_results_of_a_large_batch_equal_those_of_small_batches_at_any_alignment_
 
 
 def test_a_very_large_angle_is_correct_and_leaves_the_other_lanes_unchanged(arm: Robot) -> None:
-    fast, q = arm.compiled(arm.tip_frame), np.tile([0.3, -0.4], (11, 1))
+    fast, q = arm.compile(arm.tip_frame), np.tile([0.3, -0.4], (11, 1))
     before = fast.placement(q)
     q[5] = 1e9, -3e15
     after = fast.placement(q)
@@ -89,7 +89,7 @@ def test_a_very_large_angle_is_correct_and_leaves_the_other_lanes_unchanged(arm:
 
 
 def test_a_compiled_frame_refuses_values_that_are_not_finite_and_wrong_shapes(arm: Robot) -> None:
-    fast = arm.compiled(arm.tip_frame)
+    fast = arm.compile(arm.tip_frame)
     for bad in ([np.nan, 0.0], np.full((20, 2), np.inf)):
         with pytest.raises(InputError, match="finite"):
             fast.jacobian(np.array(bad))
@@ -104,12 +104,12 @@ def test_a_compiled_frame_refuses_values_that_are_not_finite_and_wrong_shapes(ar
     with pytest.raises(InputError, match="out must be"):
         fast.jacobian(np.zeros(2), out=np.empty(3))
     with pytest.raises(UnknownNameError):
-        arm.compiled("nowhere")
+        arm.compile("nowhere")
 
 
 def test_arrays_with_and_without_conversion_give_equal_results_and_errors() -> None:
     robot = urdfkin.load("ur5", verify=False)
-    fast, n = robot.compiled("tool0"), 37
+    fast, n = robot.compile("tool0"), 37
     q, v, a = robot.sample(n, seed=1), *np.random.default_rng(1).standard_normal((2, n, 6))
     expected, out = fast.acceleration(q.tolist(), v.tolist(), a.tolist()), np.empty((n, 6))
     before = robot.certificate().lines[0].unchecked
@@ -143,7 +143,7 @@ def test_arrays_with_and_without_conversion_give_equal_results_and_errors() -> N
 
 def test_nan_is_refused_at_every_place_of_rows_that_do_not_fill_the_registers() -> None:
     free = urdfkin.load("panda", mimic=False)
-    fast, inputs = free.compiled(free.tip_frame), np.zeros((3, 20, 9))
+    fast, inputs = free.compile(free.tip_frame), np.zeros((3, 20, 9))
     fast.acceleration(*inputs)
     for place in np.ndindex(inputs.shape):
         inputs[place] = np.nan
@@ -153,9 +153,9 @@ def test_nan_is_refused_at_every_place_of_rows_that_do_not_fill_the_registers() 
 
 
 def test_a_compiled_frame_is_cached_and_an_unpickled_copy_gives_equal_results(arm: Robot) -> None:
-    fast = arm.compiled(arm.tip_frame)
-    assert arm.compiled(arm.tip_frame) is fast
-    assert arm.compiled(arm.tip_frame, "local") is not fast
+    fast = arm.compile(arm.tip_frame)
+    assert arm.compile(arm.tip_frame) is fast
+    assert arm.compile(arm.tip_frame, "local") is not fast
     copy = pickle.loads(pickle.dumps(fast))
     assert copy.jacobian(np.zeros(2)).tobytes() == fast.jacobian(np.zeros(2)).tobytes()
 
@@ -166,9 +166,9 @@ def test_without_a_compiler_a_compiled_frame_returns_the_results_of_the_robot(
     def none(code: object) -> object:
         raise NoCompilerError("cc is not installed")
 
-    monkeypatch.setattr(compiled_frame, "library", none)
+    monkeypatch.setattr(compiled_frame, "load_library", none)
     robot = urdfkin.load("planar_two_link", verify=False)
-    fast, q = robot.compiled(robot.tip_frame), np.array([0.3, -0.4])
+    fast, q = robot.compile(robot.tip_frame), np.array([0.3, -0.4])
     assert fast.jacobian(q).tobytes() == robot.jacobian(q, robot.tip_frame).tobytes()
     assert fast.jacobian(np.tile(q, (3, 1)))[2].tobytes() == fast.jacobian(q).tobytes()
 
@@ -178,11 +178,11 @@ def test_without_a_compiler_a_compiled_frame_returns_the_results_of_the_robot(
 def test_machine_code_with_wrong_results_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def wrong(code: Any) -> object:
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        literal = c.literal
-        monkeypatch.setattr(c, "literal", lambda x: literal(x * (1.0 + 1e-12)))
-        return library(code)
+        format_literal = c.format_literal
+        monkeypatch.setattr(c, "format_literal", lambda x: format_literal(x * (1.0 + 1e-12)))
+        return load_library(code)
 
-    monkeypatch.setattr(compiled_frame, "library", wrong)
+    monkeypatch.setattr(compiled_frame, "load_library", wrong)
     robot = urdfkin.load("planar_two_link")
     with pytest.raises(VerificationError, match="jacobian"):
-        robot.compiled(robot.tip_frame).jacobian([0.3, -0.4])
+        robot.compile(robot.tip_frame).jacobian([0.3, -0.4])

@@ -234,7 +234,7 @@ def test_the_check_uses_cudas_compiler_if_a_gpu_is_present(
 ) -> None:
     monkeypatch.setattr(checking, "_has_gpu", lambda: True)
     found = check(file(code(urdfkin.load("ur5"), quantities=("placement",)), "cuda", tmp_path))
-    assert found.good
+    assert found.passed
     assert len(found.lines) >= 2
 
 

@@ -29,9 +29,9 @@ from tests.reading import present
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import fill_template
-from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, balls, literal
-from urdfkin.export.expression import Graph, Node, needed
-from urdfkin.export.proof import decimal
+from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, evaluate_intervals, format_literal
+from urdfkin.export.expression import Graph, Node, find_dependencies
+from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
@@ -70,9 +70,9 @@ def test_expressions_are_equal_to_the_chain_at_fifty_digits(rpy: str, axis: str)
         for function in found.functions:
             for vector in found.proof.vectors:
                 true = vector.results[function.name]
-                for x, text in zip(balls(function, vector.inputs), true, strict=True):
+                for x, text in zip(evaluate_intervals(function, vector.inputs), true, strict=True):
                     room = abs(x) * type(x)("1e-49") + type(x)("1e-57")
-                    assert abs(x - type(x)(text)) <= room, decimal(x)
+                    assert abs(x - type(x)(text)) <= room, format_decimal(x)
 
 
 @pytest.mark.slow
@@ -130,9 +130,11 @@ def test_the_command_states_the_proof_of_the_exact_expressions(tmp_path: Path) -
 def test_the_command_reports_exact_expressions_that_were_not_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: Any = exact_module.exact_functions
+    make_functions: Any = exact_module.make_exact_functions
     # Only the comparison of the exact expressions is turned off.
-    monkeypatch.setattr(exact_module, "exact_functions", lambda *given: made(*given[:-1], False))
+    monkeypatch.setattr(
+        exact_module, "make_exact_functions", lambda *given: make_functions(*given[:-1], False)
+    )
     done = command("export planar_two_link --to sympy-exact -o", str(tmp_path / "arm.py"))
     assert done.code == 3
     assert "NOT VERIFIED" in done.err
@@ -144,7 +146,8 @@ def test_the_command_reports_exact_expressions_that_were_not_compared(
 def test_a_difference_between_exact_expressions_and_pinocchio_is_an_error_of_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(exact_module, "_evaluated", lambda function, inputs: np.zeros((103, *function.shape)))
+    zeros: Any = lambda function, inputs: np.zeros((103, *function.shape))  # noqa: E731
+    monkeypatch.setattr(exact_module, "_evaluate_exactly", zeros)
     done = command("export", "planar_two_link", "--to", "sympy-exact", "-o", str(tmp_path / "arm.py"))
     assert done.code == 1
     assert "placement" in done.err
@@ -153,8 +156,8 @@ def test_a_difference_between_exact_expressions_and_pinocchio_is_an_error_of_the
 
 def test_a_double_cannot_enter_an_exact_expression() -> None:
     graph = ExactGraph()
-    x = graph.input("q", 0)
-    assert literal(Fraction(17, 40)) == "Rational(17, 40)"
+    x = graph.make_input("q", 0)
+    assert format_literal(Fraction(17, 40)) == "Rational(17, 40)"
     with pytest.raises(TypeError, match="is a double"):
         _ = 0.5 * x
 
@@ -167,7 +170,7 @@ def test_a_double_cannot_enter_an_exact_expression() -> None:
     ],
 )  # fmt: skip
 def test_an_angle_is_a_multiple_of_pi_if_its_double_is_the_nearest_one(decimals: str, text: str) -> None:
-    assert literal(ExactGraph().angle(Fraction(decimals))) == text
+    assert format_literal(ExactGraph().angle(Fraction(decimals))) == text
 
 
 def test_sines_and_roots_that_are_fractions_are_constants() -> None:
@@ -193,12 +196,12 @@ _OPERATIONS: dict[str, Callable[..., Counted]] = {
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:
     """Return R S by the exported expressions; each omitted entry of S has the largest possible size."""
     graph, kept = Graph(), [recursion._without_rounding(row) for row in S.tolist()]
-    letters = [[graph.input("q", 3 * r + c) for c in range(3)] for r in range(3)]
+    letters = [[graph.make_input("q", 3 * r + c) for c in range(3)] for r in range(3)]
     results = graph.chapter.product(letters, kept)
     value: dict[Node, Counted] = {}
-    for node in needed([x for row in results for x in row]):
-        of = [value[x] if isinstance(x, Node) else Counted(float(x)) for x in node.of if node.op != "q"]
-        value[node] = _OPERATIONS[node.op](*of) if of else R[node.of[0] // 3][node.of[0] % 3]
+    for node in find_dependencies([x for row in results for x in row]):
+        of = [value[x] if isinstance(x, Node) else Counted(float(x)) for x in node.operands if node.op != "q"]
+        value[node] = _OPERATIONS[node.op](*of) if of else R[node.operands[0] // 3][node.operands[0] % 3]
     names = [[next(_LEFT_OUT) for _ in row] for row in S]
 
     def number(r: int, c: int) -> Counted:

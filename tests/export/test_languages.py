@@ -26,7 +26,7 @@ from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.check import check
-from urdfkin.export.proof import decimal
+from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
 from urdfkin.verify.call import Call
@@ -52,7 +52,7 @@ def refuses(function: Any, wrong: Any, right: Any, error: type[Exception], words
 def test_the_exported_file_of_an_arm_agrees_with_values_of_fifty_digits(to: str, tmp_path: Path) -> None:
     need(to)
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
-    assert found.good, found.lines
+    assert found.passed, found.lines
     gradients = len(_THREE) if to == "torch" else 0
     assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1) + gradients
 
@@ -78,9 +78,9 @@ def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None
 def test_a_ball_is_written_with_fifty_digits_without_trailing_zeros(number: Any, text: str) -> None:
     with precision(90):
         ball = arb(number)
-        assert decimal(ball) == text
-        assert decimal(ball - ball) == "0.0"
-        assert decimal(1 / (1 / (ball + 3)) - 3) == text
+        assert format_decimal(ball) == text
+        assert format_decimal(ball - ball) == "0.0"
+        assert format_decimal(1 / (1 / (ball + 3)) - 3) == text
 
 
 @pytest.mark.slow
@@ -93,7 +93,7 @@ def test_exported_files_of_all_joint_kinds_extreme_lengths_and_a_hand_compute_tr
     # A Hessian of so many rates takes a compiler half a minute.
     asked = tuple(row for row in ALL if row != "hessian" or to in ("numpy", "array", "sympy-exact"))
     found = check(file(code(robot_of(name), quantities=asked), to, tmp_path))
-    assert found.good, found.lines
+    assert found.passed, found.lines
     assert len(found.lines) == len(asked) * (3 if to == "torch" else 2 if to in BOTH else 1)
 
 
@@ -107,7 +107,7 @@ def test_the_exported_file_of_a_small_robot_computes_true_values_in_every_refere
     for reference in Reference:
         written = code(robot, quantities=("jacobian_rate", "hessian", "acceleration"), reference=reference)
         found = check(file(written, to, tmp_path))
-        assert found.good
+        assert found.passed
         assert found.verified
 
 
@@ -168,7 +168,7 @@ def test_the_check_of_a_file_detects_a_changed_constant(to: str, tmp_path: Path)
     assert count == 1
     path.write_text(text, "utf-8")
     found = check(path)
-    assert not found.good
+    assert not found.passed
     assert any(line.startswith("WRONG placement") for line in found.lines)
     assert any(line.startswith("good acceleration") for line in found.lines)
 
@@ -198,9 +198,9 @@ def test_the_check_of_a_file_detects_a_change_of_any_constant_by_a_billionth(to:
 def test_a_frame_that_no_joint_moves_can_be_exported(to: str, tmp_path: Path) -> None:
     need(to)
     robot = urdfkin.load("planar_two_link")
-    assert check(file(code(robot, robot.link_names[0]), to, tmp_path)).good
+    assert check(file(code(robot, robot.link_names[0]), to, tmp_path)).passed
     still = robot_of("single_link")
-    assert check(file(code(still, quantities=("placement",)), to, tmp_path)).good
+    assert check(file(code(still, quantities=("placement",)), to, tmp_path)).passed
 
 
 @pytest.mark.slow
@@ -591,7 +591,7 @@ def test_dh_tables_and_screws_are_exported_in_each_language_and_checked(
     path = tmp_path / f"arm{LANGUAGES[to][1]}"
     path.write_text(urdfkin.load("ur5").export(to, "tool0", form=form), encoding="utf-8")
     found = check(path)
-    assert found.good, found.lines
+    assert found.passed, found.lines
     assert found.verified
     assert len(found.lines) == len(_THREE) * (2 if to in BOTH else 1)
     head = path.read_text("utf-8")[:3000]
@@ -625,7 +625,7 @@ def test_the_check_of_a_file_detects_a_nan_before_correct_results(to: str, tmp_p
     assert right in text
     path = tmp_path / f"arm.{'py' if to == 'numpy' else to}"
     path.write_text(text.replace(right, wrong), encoding="utf-8")
-    assert not check(path).good
+    assert not check(path).passed
 
 
 @pytest.mark.slow
@@ -644,7 +644,7 @@ def test_an_unverified_export_states_this_in_the_first_line(tmp_path: Path) -> N
         assert "UNVERIFIED" in first
         assert "UNVERIFIED" not in write(code(robot), to)
     found = check(file(code(urdfkin.load("planar_two_link", verify=False)), "numpy", tmp_path))
-    assert found.good
+    assert found.passed
     assert not found.verified
 
 

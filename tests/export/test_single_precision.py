@@ -30,12 +30,12 @@ _N = 4000
 Made = Callable[[Graph, Node, Node, Node], Any]
 
 
-def function(made: Made) -> Function:
+def function(make_node: Made) -> Function:
     graph = Graph()
-    x, y, z = (graph.input("q", k) for k in range(3))
+    x, y, z = (graph.make_input("q", k) for k in range(3))
     robot = urdfkin.load("planar_two_link", verify=False)
     plan = robot.plan([robot.tree.frame_link("tip")])
-    return Function(JACOBIAN, Reference.LOCAL, plan, (made(graph, x, y, z),))
+    return Function(JACOBIAN, Reference.LOCAL, plan, (make_node(graph, x, y, z),))
 
 
 def inputs(scale: float = 1.0) -> FloatArray:
@@ -68,18 +68,18 @@ def in_single(of: Function, q: FloatArray) -> FloatArray:
     plain |= {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
     for node in of.nodes:
         if node.op == "q":
-            numbers[node] = q[:, node.of[0]].astype(np.float32)
+            numbers[node] = q[:, node.operands[0]].astype(np.float32)
         else:
-            operands = (numbers[x] if isinstance(x, Node) else np.float32(x) for x in node.of)
+            operands = (numbers[x] if isinstance(x, Node) else np.float32(x) for x in node.operands)
             numbers[node] = plain[node.op](*operands)
     (result,) = of.results
     return np.asarray(numbers[result], dtype=np.float64)
 
 
-def worst(made: Made, scale: float = 1.0) -> float:
+def worst(make_node: Made, scale: float = 1.0) -> float:
     """Return the largest error in single precision as a share of its bound."""
-    of, q = function(made), inputs(scale)
-    true = of.values((q,))[of.results[0]]
+    of, q = function(make_node), inputs(scale)
+    true = of.node_values((q,))[of.results[0]]
     with np.errstate(all="ignore"):
         error, bound = np.abs(in_single(of, q) - true), SINGLE_EPS * single_bounds(of, (q,))[:, 0]
         return float(np.where(error > 0.0, error / bound, 0.0).max())
@@ -116,7 +116,7 @@ PASSED: dict[tuple[str, int], Made] = {
     ("*", 1): lambda g, x, y, z: z * inexact(x, y),
     ("/", 0): lambda g, x, y, z: inexact(x, y) / x,
     ("/", 1): lambda g, x, y, z: x / inexact(x, y),
-    ("neg", 0): lambda g, x, y, z: g.made("neg", inexact(x, y)),
+    ("neg", 0): lambda g, x, y, z: g.make_node("neg", inexact(x, y)),
     ("sin", 0): lambda g, x, y, z: g.sine_cosine(1024.0 * inexact(x, y))[0],
     ("cos", 0): lambda g, x, y, z: g.sine_cosine(1024.0 * inexact(x, y))[1],
     ("sqrt", 0): lambda g, x, y, z: g.root(y - 0.75 * x),
@@ -127,33 +127,33 @@ PASSED: dict[tuple[str, int], Made] = {
 def test_the_bound_includes_the_propagated_error_of_each_operand(
     op: str, operand: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made, right = PASSED[op, operand], export_function._SLOPES[op]
-    node = function(made).results[0]
+    make_node, right = PASSED[op, operand], export_function._SLOPES[op]
+    node = function(make_node).results[0]
     assert node.op == op
-    assert node.of[operand].op != "q"
-    assert worst(made) <= 1.0
+    assert node.operands[operand].op != "q"
+    assert worst(make_node) <= 1.0
 
     def without(*given: Any) -> tuple[Any, ...]:
         return tuple(0.0 * s if k == operand else s for k, s in enumerate(right(*given)))
 
     monkeypatch.setitem(export_function._SLOPES, op, without)
-    assert worst(made) > 1.0
+    assert worst(make_node) > 1.0
 
 
 def test_the_bound_of_a_product_includes_the_propagated_error_of_the_first_operand(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    made: Made = lambda g, x, y, z: inexact(x, y) * (z * z)  # noqa: E731
-    assert worst(made) <= 1.0
+    make_node: Made = lambda g, x, y, z: inexact(x, y) * (z * z)  # noqa: E731
+    assert worst(make_node) <= 1.0
     monkeypatch.setitem(export_function._SLOPES, "*", lambda value, x, y: (0.0 * y, x))
-    assert worst(made) > 1.0
+    assert worst(make_node) > 1.0
 
 
 def test_the_bound_includes_the_underflow_error_of_numbers_near_zero(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: Made = lambda g, x, y, z: x * y  # noqa: E731
-    assert 0.0 < worst(made, 2.0**-68) <= 1.0
+    make_node: Made = lambda g, x, y, z: x * y  # noqa: E731
+    assert 0.0 < worst(make_node, 2.0**-68) <= 1.0
     monkeypatch.setattr(export_function, "SINGLE_SMALLEST", 0.0)
-    assert worst(made, 2.0**-68) > 1.0
+    assert worst(make_node, 2.0**-68) > 1.0
 
 
 def test_a_number_that_overflows_in_single_precision_has_an_infinite_bound() -> None:
@@ -215,10 +215,12 @@ def test_the_bounds_of_a_file_include_the_conversion_errors_of_large_angles_and_
     text = _TURNED.format(**usual | {large: f"{1e7 + 1e-3 * seed:.4f}"})
     robot = loaded(text)
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
-    held = robot.locked({"j": 0.7})
+    held = robot.with_locked_joints({"j": 0.7})
     assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
     right = conversion
-    monkeypatch.setattr(proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTORS)))
+    monkeypatch.setattr(
+        proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTOR_COUNT))
+    )
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") > 1.0
     assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
 
@@ -236,7 +238,7 @@ def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
 ) -> None:
     robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
     right = conversion
-    for one in (robot, robot.locked({"j": 0.7})):
+    for one in (robot, robot.with_locked_joints({"j": 0.7})):
         with monkeypatch.context() as patch:
             assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
             patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=np.zeros(1)))
@@ -245,20 +247,20 @@ def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
 
 @given(st.floats(1e-300, 1e300))
 @example(3.9268392647265107)
-def test_a_printed_bound_is_rounded_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x: float) -> None:
-    assert x <= float(proof._rounded_up(x)) <= x * (1.0 + 2e-6)
-    assert x * (1.0 - 1e-5) <= float(proof._rounded_down(x)) <= x
-    assert proof._rounded_up(np.inf) == proof._rounded_down(np.nan) == "0.0"
+def test_a_printed_bound_is_round_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x: float) -> None:
+    assert x <= float(proof._round_up(x)) <= x * (1.0 + 2e-6)
+    assert x * (1.0 - 1e-5) <= float(proof._round_down(x)) <= x
+    assert proof._round_up(np.inf) == proof._round_down(np.nan) == "0.0"
 
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:
-    text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).head
+    text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).header
     words = "with the rounding of constants, in eps*scale (eps = 2^-23):"
     assert f"Error bounds in single precision, {words}" in text
     (line,) = (x for x in text if x.startswith("  placement ") and ", jacobian " in x)
     assert 1.0 < float(line.split()[1].rstrip(",")) < 24.0 * 7
     large = _FIXED.format("1e39 0 0", "0 0 0")
-    head = code(loaded(large), "b", ("placement",)).head
+    head = code(loaded(large), "b", ("placement",)).header
     assert "Single precision cannot represent a number of placement" in head
     with np.errstate(over="ignore"):
         found = shares(large, tmp_path)
@@ -281,7 +283,7 @@ def test_bounds_in_single_precision_hold_and_are_at_most_20_times_the_largest_er
         used = given[: len(of.inputs)]
         found = getattr(own, of.name)(*(x.astype(np.float32) for x in used))
         assert found.dtype == np.float32
-        error = np.abs(found - of.evaluated(used)).reshape(200, -1)
+        error = np.abs(found - of.evaluate(used)).reshape(200, -1)
         bound = SINGLE_EPS * single_bounds(of, used)
         assert np.all(error <= bound)
         assert float((error[bound > 0.0] / bound[bound > 0.0]).max()) > 0.05

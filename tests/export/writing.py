@@ -14,11 +14,11 @@ import pytest
 import urdfkin
 from tests.reading import module_of
 from urdfkin.export import LANGUAGES, write
-from urdfkin.export.code import FrameCode, code_of, exported
+from urdfkin.export.code import FrameCode, exportable_quantities, make_verified_code
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 
-ALL = tuple(row.method for row in exported())
+ALL = tuple(row.method for row in exportable_quantities())
 #: Program that compiles or runs a file in a language
 PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
 LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
@@ -31,7 +31,9 @@ def code(
     robot: Robot, frame: str | None = None, quantities: tuple[str, ...] = ALL, reference: Reference = _ALIGNED
 ) -> FrameCode:
     frame = frame or robot.tip_frame
-    return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=None, verify=None)
+    return make_verified_code(
+        robot.verifier, robot.plan, frame, quantities, reference, name=None, verify=None
+    )
 
 
 def file(written: FrameCode, to: str, folder: Path) -> Path:

@@ -18,7 +18,7 @@ from tests.laws.subjects import NAMES, as_a_block, by_the_robot, differing, prep
 from tests.robots.odd_urdfs import Urdf
 from tests.urdfs import loaded
 from urdfkin import load
-from urdfkin.compiled.evaluate import PART
+from urdfkin.compiled.evaluate import ROWS_PER_PART
 from urdfkin.compiled.plan import LANES
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.kinematics.rotation import euler_of, singularity_distance
@@ -159,7 +159,7 @@ NOT_PLAIN: dict[str, Callable[[tuple[int, ...]], Any]] = {
 def test_an_out_that_is_no_plain_array_is_refused_and_not_changed(kind: str) -> None:
     robot = load("ur5", verify=False)
     q, one, table = robot.sample(1, 1)[0], NOT_PLAIN[kind]((6, 6)), NOT_PLAIN[kind]((4, 4))
-    prepared, compiled = robot.prepare("tool0"), robot.compiled("tool0")
+    prepared, compiled = robot.prepare("tool0"), robot.compile("tool0")
     calls = [
         lambda: robot.jacobian(q, "tool0", out=one),
         lambda: robot.jacobian(q, "tool0", out=one, threads=1),
@@ -259,13 +259,13 @@ def test_one_configuration_with_many_rates_is_not_copied() -> None:
 
 @pytest.mark.parametrize("representation", ["ZYZ", "xyz", "quaternion"])
 def test_analytical_jacobians_are_equal_in_parts_with_threads_and_in_out(representation: str) -> None:
-    robot, frame, n = load("ur5", verify=False), "tool0", 2 * PART + 5
+    robot, frame, n = load("ur5", verify=False), "tool0", 2 * ROWS_PER_PART + 5
     q, _, _ = state(robot, n, 12)
-    one = robot.analytical_jacobian(q[:PART], frame, representation, nearest=0.0, threads=1)
+    one = robot.analytical_jacobian(q[:ROWS_PER_PART], frame, representation, nearest=0.0, threads=1)
     out = np.full((n, *one.shape[1:]), np.nan)
     assert robot.analytical_jacobian(q, frame, representation, nearest=0.0, out=out, threads=2) is out
-    assert not differing(out[:PART], one)
-    for k in (0, PART - 1, PART, n - 1):
+    assert not differing(out[:ROWS_PER_PART], one)
+    for k in (0, ROWS_PER_PART - 1, ROWS_PER_PART, n - 1):
         assert not differing(robot.analytical_jacobian(q[k], frame, representation, nearest=0.0), out[k])
     refused = np.full((n, 6 + (representation != "quaternion"), 6), np.nan)
     with pytest.raises(InputError, match="out must be a writable"):
@@ -275,11 +275,11 @@ def test_analytical_jacobians_are_equal_in_parts_with_threads_and_in_out(represe
 @pytest.mark.parametrize("threads", [1, 2])
 def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
     robot = load("ur5", verify=False)
-    q, _, _ = state(robot, 3 * PART, 15)
+    q, _, _ = state(robot, 3 * ROWS_PER_PART, 15)
     distances = singularity_distance("ZYZ", euler_of("ZYZ", robot.placement(q, "tool0")[:, :3, :3]))
     with pytest.raises(RepresentationSingularityError) as caught:
-        robot.analytical_jacobian(q.reshape(3, PART, 6), "tool0", nearest=1.6, threads=threads)
-    assert caught.value.sample == divmod(int(distances.argmin()), PART)
+        robot.analytical_jacobian(q.reshape(3, ROWS_PER_PART, 6), "tool0", nearest=1.6, threads=threads)
+    assert caught.value.sample == divmod(int(distances.argmin()), ROWS_PER_PART)
     assert f"sample {list(caught.value.sample)}" in str(caught.value)
     assert caught.value.distance == distances.min()
 
@@ -287,7 +287,7 @@ def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
 def test_acceleration_breakdowns_are_equal_in_parts_with_threads_and_in_out(reference: Reference) -> None:
-    robot, n = robot_of("planar_and_floating_in_the_middle"), 2 * PART + 5
+    robot, n = robot_of("planar_and_floating_in_the_middle"), 2 * ROWS_PER_PART + 5
     q, v, a = state(robot, n, 13)
     base = BaseMotion(velocity=np.linspace(-1.0, 1.0, 6 * n).reshape(n, 6))
     ask = partial(robot.acceleration_breakdown, frame=robot.tip_frame, reference=reference, verify=False)
@@ -295,7 +295,7 @@ def test_acceleration_breakdowns_are_equal_in_parts_with_threads_and_in_out(refe
     out = np.full_like(serial.terms, np.nan)
     threaded = ask(q, v, a, base=base, threads=2, out=out)
     assert threaded.terms is out
-    for k in (0, PART - 1, PART, n - 1):
+    for k in (0, ROWS_PER_PART - 1, ROWS_PER_PART, n - 1):
         alone = ask(q[k], v[k], a[k], base=BaseMotion(velocity=base.velocity[k]))
         for parts in (serial, threaded):
             assert not differing(parts.terms[k], alone.terms)
@@ -306,9 +306,9 @@ def test_acceleration_breakdowns_are_equal_in_parts_with_threads_and_in_out(refe
 
 def test_the_error_of_an_overflow_in_a_breakdown_names_the_samples() -> None:
     robot = load("ur5", verify=False)
-    q, v, a = state(robot, 2 * PART, 14)
-    v[PART + 3] = 1e200
-    with pytest.raises(RangeError, match=f"samples {PART} to {2 * PART - 1}: "):
+    q, v, a = state(robot, 2 * ROWS_PER_PART, 14)
+    v[ROWS_PER_PART + 3] = 1e200
+    with pytest.raises(RangeError, match=f"samples {ROWS_PER_PART} to {2 * ROWS_PER_PART - 1}: "):
         robot.acceleration_breakdown(q, v, a, "tool0", threads=2)
 
 

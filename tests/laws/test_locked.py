@@ -68,7 +68,7 @@ def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
 
 def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.random.Generator) -> Robot:
     """Compare every quantity of all links with the whole robot's; return the locked robot."""
-    locked = robot.locked(values_at(robot, q, names))
+    locked = robot.with_locked_joints(values_at(robot, q, names))
     of_q, of_v = kept(robot, names)
     v, a = np.zeros((2, 1, robot.nv))
     v[:, of_v], a[:, of_v] = rng.standard_normal((2, 1, len(of_v)))
@@ -104,7 +104,7 @@ def test_results_of_a_locked_robot_are_columns_of_the_complete_robots_results(na
 def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: OracleLibrary) -> None:
     robot = robot_of(name)
     names = list(LOCKS[name] or lockable(robot)[::2])
-    locked = robot.locked(values_at(robot, robot.sample(1)[0], names))
+    locked = robot.with_locked_joints(values_at(robot, robot.sample(1)[0], names))
     locked.verifier.library = oracle
     q, v, a = state(locked, 4, 3)
     for reference in Reference:
@@ -116,7 +116,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: OracleLibrary
 
 @pytest.mark.parametrize("name", ["panda", "a1"])
 def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
-    locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
+    locked = robot_of(name).with_locked_joints(joints=lockable(robot_of(name))[:2], lock="ready")
     rates = np.array([[1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0]])
     base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), *rates)
     q, v, a = state(locked, 2, 4)
@@ -150,7 +150,7 @@ def test_a_link_may_have_the_name_of_a_locked_joint(
     ends = zip("01", links, links[1:], inside, strict=False)
     text = urdfs.robot(*(joint(name, "revolute", a, b, 'xyz="0 0 1"', "0 1 0", x) for name, a, b, x in ends))
     locked_joints = lock if multiplier is None else "0"  # a mimic joint has no value of its own
-    locked = loaded(text).locked(dict.fromkeys(locked_joints, 0.3))
+    locked = loaded(text).with_locked_joints(dict.fromkeys(locked_joints, 0.3))
     locked.placement(locked.sample(2), locked.link_frames)
     assert locked.certificate().verified
 
@@ -162,10 +162,10 @@ def test_the_bound_of_a_prismatic_joint_locked_at_the_parent_origin_includes_rou
     written = " ".join(map(repr, (axis / math.hypot(*axis)).tolist()))  # a unit vector only up to rounding
     whole = loaded(urdfs.robot(joint("s", "prismatic", "a", "b", origin, written, limit(-9, 9))))
     for value in (-length, np.nextafter(-length, 0.0), 7.3):
-        locked = whole.locked({"s": float(value)})
+        locked = whole.with_locked_joints({"s": float(value)})
         locked.placement([], "b")
         assert locked.certificate().verified
-    locked = whole.locked({"s": -length})
+    locked = whole.with_locked_joints({"s": -length})
     assert locked.joints["s"].length == pytest.approx(2.0 * length)
     assert np.abs(locked.joints["s"].T_parent_joint[:3, 3]).max() < 1e-15
 
@@ -175,7 +175,7 @@ def test_the_bound_of_a_prismatic_joint_locked_at_the_parent_origin_includes_rou
 
 def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_robot() -> None:
     whole = robot_of("panda")
-    locked = whole.locked({"panda_finger_joint1": 0.04})
+    locked = whole.with_locked_joints({"panda_finger_joint1": 0.04})
     assert locked.urdf == whole.urdf
     model = locked.pinocchio_model()
     assert model.nq == 7
@@ -187,7 +187,7 @@ def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_rob
 @pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
 @pytest.mark.parametrize("mistake", ["value", "mimic", "sense", "free"])
 def test_both_oracles_detect_a_wrongly_locked_tree(mistake: str, oracle: OracleLibrary) -> None:
-    robot = robot_of("panda").locked({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
+    robot = robot_of("panda").with_locked_joints({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
     robot.verifier.library = oracle
     other = {
         "value": {"panda_finger_joint1": 0.03, "panda_joint7": 0.5000001},
@@ -195,7 +195,7 @@ def test_both_oracles_detect_a_wrongly_locked_tree(mistake: str, oracle: OracleL
         "sense": {"panda_finger_joint1": 0.03, "panda_joint7": -0.5},
         "free": {"panda_finger_joint1": 0.03},
     }[mistake]
-    robot.tree = robot.verifier.tree = robot_of("panda").locked(other).tree
+    robot.tree = robot.verifier.tree = robot_of("panda").with_locked_joints(other).tree
     if mistake == "free":
         with pytest.raises(OracleError, match="finds different joints"):
             robot.verifier.oracle(None, oracle)
@@ -217,11 +217,11 @@ def test_with_free_mimic_joints_a_lock_holds_only_the_named_joint() -> None:
 def test_every_way_to_lock_a_joint_gives_the_same_robot() -> None:
     panda = urdfkin.load("panda")
     arm, lock = [f"panda_joint{i}" for i in range(1, 8)], {"panda_finger_joint1": 0.04}
-    first = panda.locked(lock)
+    first = panda.with_locked_joints(lock)
     ways = [
         first,
-        panda.locked("panda_finger_joint1=40mm"),
-        panda.locked(lock, joints=arm),
+        panda.with_locked_joints("panda_finger_joint1=40mm"),
+        panda.with_locked_joints(lock, joints=arm),
         urdfkin.load("panda", lock={"panda_finger_joint1": "40mm"}),
         urdfkin.load("panda", lock=lock, joints=arm),
         pickle.loads(pickle.dumps(first)),
@@ -233,32 +233,34 @@ def test_every_way_to_lock_a_joint_gives_the_same_robot() -> None:
         assert way.origin.lock == (("panda_finger_joint1", 0.04),)
         assert way.placement(q, "panda_leftfinger").tobytes() == T.tobytes()
         assert way.jacobian(q, "panda_hand_tcp").shape == (6, 7)
-    twice = panda.locked({"panda_joint7": 0.5}).locked(lock)
+    twice = panda.with_locked_joints({"panda_joint7": 0.5}).with_locked_joints(lock)
     assert twice.origin.lock == (("panda_joint7", 0.5), ("panda_finger_joint1", 0.04))
     assert (twice.nq, panda.nq) == (6, 8)
 
 
 def test_the_joints_that_are_not_listed_are_locked_at_zero_or_at_a_pose() -> None:
     panda = urdfkin.load("panda")
-    ready = panda.locked("ready, panda_joint7=30deg", joints=["panda_joint2", "panda_joint1"])
+    ready = panda.with_locked_joints("ready, panda_joint7=30deg", joints=["panda_joint2", "panda_joint1"])
     assert ready.joint_names == ("panda_joint1", "panda_joint2")
     assert held(ready, "panda_joint7") == math.radians(30)
     assert held(ready, "panda_joint4") == panda.poses["ready"][3]
-    arm = urdfkin.load("planar_two_link").locked(joints=["joint_1"])
+    arm = urdfkin.load("planar_two_link").with_locked_joints(joints=["joint_1"])
     assert held(arm, "joint_2") == 0.0
     assert arm.placement([0.0], "tip")[:3, 3].tolist() == [0.9, 0.0, 0.0]
-    assert urdfkin.load("planar_two_link").locked(joints=[]).nq == 0
+    assert urdfkin.load("planar_two_link").with_locked_joints(joints=[]).nq == 0
 
 
 def test_a_locked_robot_is_the_same_as_its_text_with_fixed_joints() -> None:
     whole = urdfkin.load("ur5")
-    locked = whole.locked({"wrist_1_joint": 0.5, "shoulder_pan_joint": -1.0})
+    locked = whole.with_locked_joints({"wrist_1_joint": 0.5, "shoulder_pan_joint": -1.0})
     assert urdfkin.same(locked, urdfkin.load(to_urdf(locked.tree)))
-    assert not urdfkin.same(locked, whole.locked({"wrist_1_joint": 0.6, "shoulder_pan_joint": -1.0}))
+    assert not urdfkin.same(
+        locked, whole.with_locked_joints({"wrist_1_joint": 0.6, "shoulder_pan_joint": -1.0})
+    )
 
 
 def test_all_other_results_exist_for_a_locked_robot() -> None:
-    panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04, "panda_joint3": 0.3})
+    panda = urdfkin.load("panda").with_locked_joints({"panda_finger_joint1": 0.04, "panda_joint3": 0.3})
     frame, q = "panda_hand_tcp", panda.poses["ready"]
     T = panda.placement(q, frame)
     table = panda.dh(frame)
@@ -305,8 +307,8 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
     whole = urdfkin.load("panda")
     true = urdfkin.load(whole.urdf.replace('xyz="0 0 0.107"', 'xyz="0 0.001 0.107"'))
     lock = {"panda_joint7": 0.6, "panda_finger_joint1": 0.02}
-    locked, q = whole.locked(lock), whole.locked(lock).sample(40)
-    T = true.locked(lock).placement(q, "panda_leftfinger")
+    locked, q = whole.with_locked_joints(lock), whole.with_locked_joints(lock).sample(40)
+    T = true.with_locked_joints(lock).placement(q, "panda_leftfinger")
     found = urdfkin.calibrate(locked, q, T, tip="panda_leftfinger", write_all=True)
     written = urdfkin.load(found.updated_urdf.text)
     full = np.insert(np.concatenate((q, np.full((40, 1), 0.02)), axis=1), 6, 0.6, axis=1)
@@ -339,7 +341,10 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
     ],
 )
 def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) -> None:
-    for lock in (lambda: urdfkin.load("panda", **options), lambda: urdfkin.load("panda").locked(**options)):
+    for lock in (
+        lambda: urdfkin.load("panda", **options),
+        lambda: urdfkin.load("panda").with_locked_joints(**options),
+    ):
         with pytest.raises(urdfkin.UrdfkinError, match=re.escape(words)):
             lock()
 
@@ -350,15 +355,15 @@ def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) ->
 )
 def test_a_floating_joint_cannot_be_locked(options: dict[str, Any]) -> None:
     with pytest.raises(urdfkin.InputError, match="a floating joint has no single value to lock"):
-        urdfkin.load("a1", root_joint="floating").locked(**options)
+        urdfkin.load("a1", root_joint="floating").with_locked_joints(**options)
 
 
 def test_a_locked_joint_is_named_in_the_errors_about_q() -> None:
-    locked = urdfkin.load("planar_two_link").locked({"joint_1": 0.5})
+    locked = urdfkin.load("planar_two_link").with_locked_joints({"joint_1": 0.5})
     with pytest.raises(urdfkin.InputError, match=r"leave out this joint, locked at 0\.5"):
         locked.placement({"joint_1": 0.5, "joint_2": 0.0})
     with pytest.raises(urdfkin.InputError, match=r"locked at 0\.5"):
-        locked.locked({"joint_1": 0.4})
+        locked.with_locked_joints({"joint_1": 0.4})
 
 
 def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_it() -> None:
@@ -367,10 +372,10 @@ def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_i
         loaded(urdfs.robot(leader, joint("y", "revolute", "b", "c", "", "1 0 0", follows + limit(low, 9))))
         for low in (0, 3)
     )
-    assert good.locked({"x": 0.5}).nq == 0
+    assert good.with_locked_joints({"x": 0.5}).nq == 0
     with pytest.raises(urdfkin.InputError, match="joint y: -1 is outside"):
-        good.locked({"x": -0.5})
-    assert impossible.locked({"x": 0.5}).nq == 0
+        good.with_locked_joints({"x": -0.5})
+    assert impossible.with_locked_joints({"x": 0.5}).nq == 0
 
 
 @pytest.mark.parametrize("convention", ["isaaclab", "isaaclab3", "mujoco", "newton", "alphabetical"])
@@ -382,7 +387,7 @@ def test_a_lock_only_removes_the_locked_joint_from_the_joint_order_of_another_to
     order = robot.convention(convention).joint_names
     middle = robot.sample(1)[0]
     for name_of in order[::3]:
-        locked = robot.locked({name_of: middle[robot.coordinate_names.index(name_of)]})
+        locked = robot.with_locked_joints({name_of: middle[robot.coordinate_names.index(name_of)]})
         assert locked.convention(convention).joint_names == tuple(x for x in order if x != name_of)
 
 

@@ -15,7 +15,7 @@ from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import ImplausibleError
 from urdfkin.model.configuration import degrees_messages
 from urdfkin.robot import Robot
-from urdfkin.robot.trajectory import line
+from urdfkin.robot.trajectory import make_line_trajectory
 
 #: A pose of the ur5 in degrees.
 DEGREES = [0.0, -90.0, 90.0, -45.0, 30.0, 0.0]
@@ -43,7 +43,7 @@ WAYS: dict[str, Callable[[Robot], object]] = {
     "to pinocchio": lambda robot: robot.to_pinocchio(DEGREES),
     "convention": lambda robot: robot.convention("drake").to(DEGREES),
     "view": lambda robot: robot.view(DEGREES),
-    "trajectory": lambda robot: line(robot, np.zeros(6), np.array(DEGREES), 1.0, 5),
+    "trajectory": lambda robot: make_line_trajectory(robot, np.zeros(6), np.array(DEGREES), 1.0, 5),
     "prepared": lambda robot: urdfkin.load("ur5").prepare("tool0").placement(np.array(DEGREES)),
     "prepared, unchecked": lambda _: urdfkin.load("ur5", verify=False).placement(np.array(DEGREES)),
 }

@@ -14,7 +14,7 @@ from tests import urdfs
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
-from urdfkin.errors.numbers import in_radians, parse_quantity
+from urdfkin.errors.numbers import parse_quantity, radians_from_degrees
 from urdfkin.model.configuration import coordinate_layout
 from urdfkin.model.configuration_like import CoordinateLayout
 from urdfkin.robot import Robot
@@ -178,7 +178,9 @@ def test_a_robot_without_moving_joints_accepts_empty_input() -> None:
 def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> None:
     found = parse_quantity(f"{value!r}{unit}")
     assert found is not None
-    scaled = {"deg": in_radians(value), "°": in_radians(value), "mm": value / 1000.0}.get(unit.strip(), value)
+    scaled = {"deg": radians_from_degrees(value), "°": radians_from_degrees(value), "mm": value / 1000.0}.get(
+        unit.strip(), value
+    )
     assert found.value == scaled
 
 

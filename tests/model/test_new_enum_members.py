@@ -13,10 +13,10 @@ import urdfkin
 from urdfkin.cli.options import REFERENCES
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
-from urdfkin.compiled.machine.single import single
+from urdfkin.compiled.machine.single import make_single_evaluator
 from urdfkin.compiled.plan import REFERENCES as IN_KERNELS
 from urdfkin.compiled.plan import CompiledTree, compile_tree
-from urdfkin.export.function import function_of
+from urdfkin.export.function import make_function
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
 from urdfkin.kinematics.rotation import EULER_SEQUENCES
@@ -25,7 +25,7 @@ from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
-from urdfkin.robot.trajectory import _rates
+from urdfkin.robot.trajectory import _central_velocities
 from urdfkin.verify.bounds import magnitudes, movable
 from urdfkin.verify.exact.numbers import ExactJoint
 from urdfkin.verify.exact.recursion import move
@@ -84,7 +84,7 @@ def test_functions_for_single_configurations_refuse_a_new_reference_frame(
     plan: Any, reference: Reference, name: str
 ) -> None:
     with pytest.raises(REFUSED):
-        single(name.replace(" ", "_"), plan, reference)
+        make_single_evaluator(name.replace(" ", "_"), plan, reference)
 
 
 def test_the_breakdown_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:
@@ -95,7 +95,7 @@ def test_the_breakdown_of_an_acceleration_refuses_a_new_reference_frame(robot: u
 @pytest.mark.parametrize("name", sorted(EXPORTED.keys() - {"placement"}))
 def test_exported_code_refuses_a_new_reference_frame(plan: CompiledTree, name: str) -> None:
     with pytest.raises(REFUSED):
-        function_of(plan, QUANTITIES[name], NEW["bare"])
+        make_function(plan, QUANTITIES[name], NEW["bare"])
 
 
 @pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
@@ -163,10 +163,10 @@ METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "sample": lambda robot, _: robot.sample(1),
     "names": lambda robot, _: robot.coordinate_names,
     "convention": lambda robot, _: robot.convention("mujoco"),
-    "export": lambda robot, _: function_of(plan_of_last(robot), QUANTITIES["velocity"], Reference.WORLD),
+    "export": lambda robot, _: make_function(plan_of_last(robot), QUANTITIES["velocity"], Reference.WORLD),
     "same": lambda robot, _: urdfkin.same(robot, robot),
     "digits": lambda robot, x: move(robot.tree, {0: ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)}, x, x, x),
-    "velocities": lambda robot, x: _rates(robot.tree, np.stack((x, x, x)), np.arange(3.0)),
+    "velocities": lambda robot, x: _central_velocities(robot.tree, np.stack((x, x, x)), np.arange(3.0)),
     "integrate": lambda robot, x: robot.integrate(x, x),
     "difference": lambda robot, x: robot.difference(x, x),
 }

@@ -149,7 +149,7 @@ def test_the_number_and_size_of_reports_are_limited(month: Path, monkeypatch: py
     with pytest.raises(InputError, match="more than 7 reports"):
         read_history([month])
     monkeypatch.undo()
-    monkeypatch.setattr(module, "MOST", 1000)
+    monkeypatch.setattr(module, "MAX_BYTES", 1000)
     with pytest.raises(InputError, match=r"no report to show: found .*too large"):
         read_history([month])
 

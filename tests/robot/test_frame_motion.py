@@ -28,7 +28,7 @@ def assert_is_the_robots(
     np.testing.assert_array_equal(x.velocity, robot.velocity(q, v, tip, **referred))
     np.testing.assert_array_equal(x.acceleration, robot.acceleration(q, v, a, tip, **referred))
     np.testing.assert_array_equal(x.jacobian, robot.jacobian(q, tip, **referred))
-    np.testing.assert_allclose(x.parts.total, x.acceleration, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(x.breakdown.total, x.acceleration, rtol=1e-12, atol=1e-12)
     assert x.agrees
 
 
@@ -49,8 +49,8 @@ def test_a_disagreement_of_a_frame_motion_is_stored_and_raises_no_error(
     monkeypatch.setattr(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
     x = frame_motion(robot, state(robot, N, 0), robot.tip_frame)
     assert not x.agrees
-    assert (x.checks["velocity"].share > 1.0).all()
-    assert (x.checks["placement"].share < 1.0).all()
+    assert (x.checks["velocity"].bound_ratio > 1.0).all()
+    assert (x.checks["placement"].bound_ratio < 1.0).all()
 
 
 def test_manipulability_is_the_square_root_of_the_determinant_of_j_times_j_transposed() -> None:

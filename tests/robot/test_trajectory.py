@@ -9,7 +9,7 @@ import pytest
 import urdfkin
 from urdfkin.errors import InputError, SourceError
 from urdfkin.robot import Robot
-from urdfkin.robot.trajectory import Trajectory, line, read_columns, read_trajectory
+from urdfkin.robot.trajectory import Trajectory, make_line_trajectory, read_columns, read_trajectory
 
 PARTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 JOINTS = [f"{part}_joint" for part in PARTS]
@@ -22,7 +22,7 @@ def robot() -> Robot:
 
 
 def test_a_line_starts_and_ends_at_rest_and_is_halfway_at_half_time(robot: Robot) -> None:
-    x = line(robot, robot.neutral(), END, 2.0, 101)
+    x = make_line_trajectory(robot, robot.neutral(), END, 2.0, 101)
     np.testing.assert_array_equal(x.q[0], robot.neutral())
     np.testing.assert_allclose(x.q[-1], END, rtol=1e-15)
     np.testing.assert_allclose(x.q[50], END / 2, rtol=1e-15)
@@ -33,7 +33,7 @@ def test_a_line_starts_and_ends_at_rest_and_is_halfway_at_half_time(robot: Robot
 
 def test_velocities_and_accelerations_of_a_line_are_derivatives(robot: Robot) -> None:
     # The error of fourth-order differences of a quintic is h^4 times the fifth derivative.
-    x = line(robot, robot.neutral(), END, 1.5, 401)
+    x = make_line_trajectory(robot, robot.neutral(), END, 1.5, 401)
     h = x.t[1]
     for values, rates in ((x.q, x.v), (x.v, x.a)):
         slopes = (values[:-4] - 8 * values[1:-3] + 8 * values[3:-1] - values[4:]) / (12 * h)
@@ -45,14 +45,14 @@ def test_a_line_without_a_positive_duration_or_enough_samples_is_refused(
     robot: Robot, duration: float, samples: int
 ) -> None:
     with pytest.raises(InputError, match="duration"):
-        line(robot, robot.neutral(), END, duration, samples)
+        make_line_trajectory(robot, robot.neutral(), END, duration, samples)
 
 
 @pytest.mark.parametrize("root", ["floating", "planar"])
 def test_velocities_on_a_line_of_a_floating_base_are_derivatives_of_frame_positions(root: str) -> None:
     robot = urdfkin.load("a1", root_joint=root, verify=False)
     ends = robot.sample(2, seed=8)
-    x = line(robot, ends[0], ends[1], 2.0, 2001)
+    x = make_line_trajectory(robot, ends[0], ends[1], 2.0, 2001)
     np.testing.assert_allclose(robot.difference(x.q[-1], ends[1]), 0.0, atol=1e-13)
     p = robot.placement(x.q, "FL_foot")[:, :3, 3]
     h = x.t[1] - x.t[0]
@@ -80,7 +80,7 @@ def read(robot: Robot, tmp_path: Path) -> Read:
 
 @pytest.fixture(scope="module")
 def direct(robot: Robot) -> Trajectory:
-    return line(robot, robot.neutral(), END, 2.0, 41)
+    return make_line_trajectory(robot, robot.neutral(), END, 2.0, 41)
 
 
 def columns_of(x: Trajectory, letters: str = "") -> Columns:
@@ -96,7 +96,7 @@ def test_a_trajectory_table_with_velocities_is_read_back_exactly_in_any_column_o
     x = read(dict(sorted(columns_of(direct, "va").items(), reverse=True)))
     for ours, theirs in ((x.t, direct.t), (x.q, direct.q), (x.v, direct.v), (x.a, direct.a)):
         np.testing.assert_array_equal(ours, theirs)
-    assert x.rates == "as given"
+    assert x.rates_source == "as given"
 
 
 def test_velocities_missing_in_a_trajectory_table_are_central_differences(
@@ -105,7 +105,7 @@ def test_velocities_missing_in_a_trajectory_table_are_central_differences(
     x = read(columns_of(direct))
     np.testing.assert_allclose(x.v[2:-2], direct.v[2:-2], atol=0.02)
     np.testing.assert_allclose(x.a[4:-4], direct.a[4:-4], atol=0.15)
-    assert x.rates == "by central differences"
+    assert x.rates_source == "by central differences"
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_an_invalid_or_missing_trajectory_table_is_refused_with_the_reason(
 def test_the_estimated_errors_of_central_differences_are_near_the_true_errors(
     samples: int, robot: Robot, read: Read
 ) -> None:
-    direct = line(robot, robot.neutral(), END, 2.0, samples)
+    direct = make_line_trajectory(robot, robot.neutral(), END, 2.0, samples)
     found = read(columns_of(direct))
     assert found.errors is not None
     for estimate, ours, theirs in zip(found.errors, (found.v, found.a), (direct.v, direct.a), strict=True):
@@ -156,7 +156,7 @@ def test_missing_accelerations_are_differences_of_the_given_velocities(
     found = read(columns_of(direct, "v"))
     np.testing.assert_array_equal(found.v, direct.v)
     np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
-    assert found.rates == "v as given, and a by central differences of this v"
+    assert found.rates_source == "v as given, and a by central differences of this v"
     with pytest.raises(InputError, match="joint accelerations need joint velocities"):
         read(columns_of(direct, "a"))
 
@@ -213,7 +213,7 @@ def test_a_wrong_unit_is_refused_with_the_valid_units(heading: str, remedy: str)
 def test_a_trajectory_table_in_a_convention_is_converted_to_the_same_motion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     start, end = robot.sample(2, seed=8)
-    x = line(robot, start, end, 2.0, 31)
+    x = make_line_trajectory(robot, start, end, 2.0, 31)
     mujoco = robot.convention("mujoco")
     names = [
         *mujoco.coordinate_names,

@@ -9,10 +9,10 @@ import pytest
 from tests.dh.arms import published
 from tests.reading import present
 from urdfkin.dh import read_table
-from urdfkin.dh.common_normals import left_out
+from urdfkin.dh.common_normals import sum_zeroed_tilts
 from urdfkin.dh.compare import compare
-from urdfkin.dh.make import dh_table
-from urdfkin.dh.parse_table import reference_path, references
+from urdfkin.dh.make import make_dh_table
+from urdfkin.dh.parse_table import published_tables, reference_path
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.robot.loading import load
@@ -29,10 +29,10 @@ def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long
     root = robot.tree.links[0]
     for leaf in robot.tree.leaves():
         tip = robot.tree.links[leaf]
-        table = dh_table(robot.tree, tip, root, convention)
+        table = make_dh_table(robot.tree, tip, root, convention)
         check = present(robot.verifier.table(table, samples=10))
         assert check.agrees
-        assert max(check.units.values()) <= 20.0 + left_out(robot.chain(tip, root)) / EPS
+        assert max(check.units.values()) <= 20.0 + sum_zeroed_tilts(robot.chain(tip, root)) / EPS
         reach = float(robot.chain(tip, root).lengths.sum())
         assert all(max(abs(row.a), abs(row.d)) <= 10.0 * reach for row in table.rows)
 
@@ -96,7 +96,7 @@ def test_kinovas_published_table_differs_from_the_urdf_only_by_rounding() -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", references())
+@pytest.mark.parametrize("name", published_tables())
 def test_a_bundled_reference_table_agrees_with_the_urdf_to_the_stated_accuracy(name: str) -> None:
     found = compare(*published(name))
     text = reference_path(name).read_text()
@@ -119,7 +119,7 @@ def test_an_error_of_0_3_mm_in_a_published_table_is_detected() -> None:
     found = compare(path, replace(reference, rows=tuple(rows)))
     assert not found.agrees
     assert found.senses == (1, 1, 1, -1, 1, 1, 1)
-    wrong = [one for one in found.differences if one.tip > 1e-4]
+    wrong = [one for one in found.differences if one.tip_displacement > 1e-4]
     assert [(one.row, one.cell) for one in wrong] == [(3, "a")]
     assert wrong[0].difference == pytest.approx(3e-4, abs=1e-9)
 

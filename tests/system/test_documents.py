@@ -19,7 +19,7 @@ from urdfkin.errors import InputError, SourceError
 from urdfkin.report.compare import COMPARISON, compare
 from urdfkin.report.history import HISTORY, read_history
 from urdfkin.report.reading import check_document, read_document
-from urdfkin.system.documents import DocumentKind, Header, as_data, plain
+from urdfkin.system.documents import DocumentKind, Header, as_data, as_json_data
 from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION
@@ -103,10 +103,10 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
     layout: DocumentKind[Any], entry: str, value: object, said: str
 ) -> None:
     with pytest.raises(InputError) as error:
-        layout.checked(made(layout) | {entry: value}, "a.json")
+        layout.validate(made(layout) | {entry: value}, "a.json")
     assert str(error.value).startswith(f"a.json: does not conform to the layout {layout.name}: found $")
     assert said in str(error.value)
-    assert error.value.remedy == f"write it again with: {layout.made_by}"
+    assert error.value.remedy == f"write it again with: {layout.command}"
     schema = Draft202012Validator(layout.schema())
     assert not schema.is_valid(made(layout) | {entry: value})
 
@@ -115,24 +115,24 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
 def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
-        layout.checked({"schema": f"{family}/99"}, "a.json")
+        layout.validate({"schema": f"{family}/99"}, "a.json")
     others: list[Any] = [None, [], "text", {}, {"schema": None}, {"schema": "other/1"}, {"schema": {"a": 1}}]
     for data in others:
         with pytest.raises(InputError, match=f"not a file with the layout {layout.name}.*write one with: "):
-            layout.checked(data, "a.json")
+            layout.validate(data, "a.json")
 
 
 @pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=attrgetter("name"))
 def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: DocumentKind[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
-        layout.checked(made(layout) | {"more": 1}, "a.json")
+        layout.validate(made(layout) | {"more": 1}, "a.json")
 
 
 def test_an_unknown_entry_at_any_depth_is_refused() -> None:
     document = made(SAME)
     document["remarks"][1]["words"] = "a sentence"
     with pytest.raises(InputError, match=r"found \$\.remarks\[1\]: unknown entry 'words'"):
-        SAME.checked(document, "a.json")
+        SAME.validate(document, "a.json")
     assert not Draft202012Validator(SAME.schema()).is_valid(document)
 
 
@@ -148,7 +148,9 @@ def test_a_file_that_is_not_json_is_refused(layout: DocumentKind[Any], text: str
 
 
 def test_serialized_data_has_no_infinity_and_preserves_names_that_are_not_valid_text() -> None:
-    assert plain({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {"a": [None, None, -0.0, "\udc80"]}
+    assert as_json_data({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {
+        "a": [None, None, -0.0, "\udc80"]
+    }
     assert as_data({"a": float("inf")}) == {"a": float("inf")}
 
 

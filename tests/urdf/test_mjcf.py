@@ -23,7 +23,7 @@ from tests.urdf.lint.cases.arm import arm
 from tests.urdfs import loaded
 from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
-from urdfkin.system.processes import ask_python
+from urdfkin.system.processes import run_python
 from urdfkin.urdf import mjcf
 from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
@@ -476,16 +476,16 @@ def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None
 
 
 def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = ask_python
+    right = run_python
 
     def first_only(*arguments: Any) -> tuple[bytes, None]:
         return right(*arguments)[0].splitlines(keepends=True)[0], None
 
-    monkeypatch.setattr(mjcf_check, "ask_python", first_only)
+    monkeypatch.setattr(mjcf_check, "run_python", first_only)
     robot = loaded(free_body(joint='align="true"'))
     assert "shapes and inertias: MuJoCo did not finish within 60 s" in robot.verifier.reading
     assert "MJCF101" in {finding.code for finding in robot.findings}
-    monkeypatch.setattr(mjcf_check, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
+    monkeypatch.setattr(mjcf_check, "run_python", lambda *arguments: (b'{"urdf": "half', -11))
     words = "<text>: MuJoCo cannot compile this MJCF: found MuJoCo's process ended"
     with pytest.raises(InputError, match=words):
         loaded(free_body())

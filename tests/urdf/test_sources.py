@@ -25,7 +25,7 @@ from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as urdf
 from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
 from urdfkin.errors import OracleError
-from urdfkin.system.files import MOST, read_standard_input
+from urdfkin.system.files import MAX_BYTES, read_standard_input
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.sources import Source, read_source
 from urdfkin.verify import conversions
@@ -45,7 +45,7 @@ def test_at_most_one_byte_more_than_the_limit_is_read(
     for source in sources:
         assert len(read_source(source, MOST_HERE).data) == MOST_HERE + 1
     assert len(read_source("panda").data) > MOST_HERE + 1
-    assert MOST == 100_000_000
+    assert MAX_BYTES == 100_000_000
 
 
 def test_standard_input_is_read_completely_without_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -767,7 +767,7 @@ def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch
     for k in range(200):  # the process may have 64 open files
         part.Export(str(path.with_name(f"part{k}.usdc")))
     assert loaded(path).nq == 2
-    monkeypatch.setattr(usd, "_LAYERS", 100)
+    monkeypatch.setattr(usd, "_MAX_LAYERS", 100)
     with pytest.raises(InputError, match="too many layers: found over 100"):
         usd.find_layer_files(usd.import_openusd(), str(path))
 
@@ -859,7 +859,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
         return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0
 
-    monkeypatch.setattr(usd_check, "ask_python", ask)
+    monkeypatch.setattr(usd_check, "run_python", ask)
     return loaded(path)
 
 
@@ -974,7 +974,7 @@ def test_single_precision_explains_the_difference_from_the_urdf(converted: Read,
     assert found.single is not None
     assert found.up_to_single
     assert (found.unexplained, found.within_single) == ((), False)
-    assert 0.0 < found.written[0] <= found.single[0] < 5e-6
+    assert 0.0 < found.bound_as_written[0] <= found.single[0] < 5e-6
     assert found.holds(SameQuestion())
     assert found.holds(SameQuestion(strict=True)) is not bool(found.remarks)
     assert found.holds(SameQuestion(within=5e-6))
@@ -1041,7 +1041,8 @@ def test_an_error_smaller_than_the_rounding_of_a_long_slide_is_found_at_its_join
     stage_file = write(text.replace("(0.333,", "(0.33305,"))
     found = urdfkin.same(robot, loaded(stage_file), boxes=0)
     assert found.single is not None
-    assert 4e-5 < found.written[0] < found.single[0]  # the sum of all roundings does not exclude the error
+    # The sum of all roundings does not exclude the error.
+    assert 4e-5 < found.bound_as_written[0] < found.single[0]
     assert found.within_single
     assert not found.up_to_single
     assert not found.holds(SameQuestion())

@@ -23,7 +23,7 @@ from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import accuracy_words, more_accurate, more_accurate_counts
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, Errors, accuracy_study, exact_quaternion
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
@@ -294,16 +294,16 @@ def test_errors_are_equal_only_if_they_are_the_same_double() -> None:
         return AccuracyLine("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
 
     study = AccuracyStudy("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
-    lines = plain(study)["lines"]
+    lines = as_json_data(study)["lines"]
     assert [more_accurate(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
     counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
     assert more_accurate_counts(lines) == counts
-    assert accuracy_words(plain(study)) == f"1 sample; {counts}"
+    assert accuracy_words(as_json_data(study)) == f"1 sample; {counts}"
     assert f"\n{counts}. " in make_pages.study_parts({"arm": study})["counts"]
 
 
 def test_the_page_marks_the_equal_results_of_polar() -> None:
-    lines = plain(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
+    lines = as_json_data(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
     table = make_pages.path_of("accuracy").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
     assert [ours == theirs for ours, theirs in rows] == [more_accurate(line) == "equal" for line in lines]

@@ -34,7 +34,7 @@ from tests.reading import present
 from tests.validation import faulty_worker
 from tests.validation.test_store import numbers
 from urdfkin.errors import InputError
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 from urdfkin.validation import cluster
 from urdfkin.validation.answer import CRASHED_TWICE
 from urdfkin.validation.campaign import read_stored_report, validate
@@ -131,7 +131,7 @@ def test_no_process_imports_a_module_from_dasks_folder(
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "planted.py").write_text("")
         monkeypatch.syspath_prepend(str(tmp_path / folder))
-        done = subprocess.run(own_python("import planted"), capture_output=True, text=True, check=False)
+        done = subprocess.run(python_command("import planted"), capture_output=True, text=True, check=False)
         assert "No module named 'planted'" in done.stderr
 
 

@@ -16,7 +16,7 @@ from tests.reading import present
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
-from urdfkin.dh import dh_table
+from urdfkin.dh import make_dh_table
 from urdfkin.robot import Robot
 from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
@@ -65,10 +65,10 @@ def test_a_wrong_table_of_one_convention_fails_the_robot(wrong: str, monkeypatch
     shifted[0, 3] = 1e-9
 
     def shifted_table(tree: Any, tip: Any, base: Any, convention: str) -> object:
-        table = dh_table(tree, tip, base, convention)
+        table = make_dh_table(tree, tip, base, convention)
         return replace(table, tool=table.tool @ shifted) if convention == wrong else table
 
-    monkeypatch.setattr(robot_summary, "dh_table", shifted_table)
+    monkeypatch.setattr(robot_summary, "make_dh_table", shifted_table)
     (bad,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scripts.check_bits import WAYS
-from urdfkin.compiled.preload import Way, only
+from urdfkin.compiled.preload import ComputeMode, use_only
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import disagreement, worst_of_each
@@ -23,8 +23,8 @@ scales = st.one_of(
 
 @pytest.fixture(autouse=True, params=WAYS)
 def _in_both_ways(request: pytest.FixtureRequest) -> Iterator[None]:
-    way: Way = request.param
-    with only(way):
+    way: ComputeMode = request.param
+    with use_only(way):
         yield
 
 

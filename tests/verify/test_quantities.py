@@ -16,7 +16,7 @@ from scripts.check_bits import WAYS
 from tests.cli.running import urdfkin as command
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.preload import use_only
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
 from urdfkin.model.configuration import draw_base_motion, draw_samples, special_configurations
@@ -133,7 +133,7 @@ def test_a_new_quantity_is_checked_along_a_trajectory() -> None:
     q = robot.sample(3)
     x = frame_motion(robot, (q, q, q), "tool0")
     assert x.agrees
-    assert x.checks["angular velocity"].share.shape == (3,)
+    assert x.checks["angular velocity"].bound_ratio.shape == (3,)
 
 
 # -- the table -----------------------------------------------------------------------------------------
@@ -191,7 +191,7 @@ def test_coupled_columns_are_the_product_with_g_to_the_last_bit(data: st.DataObj
         for column in columns:
             expected[..., index[column]] += J[..., column] * factor[column]
     for way in WAYS:
-        with only(way):
+        with use_only(way):
             np.testing.assert_array_equal(coupled(J, columns, index, factor, nv), expected)
 
 

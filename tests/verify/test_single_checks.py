@@ -13,8 +13,8 @@ import urdfkin
 from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin import Reference, VerificationError
 from urdfkin.compiled.evaluate import jacobians
-from urdfkin.compiled.machine.single import single
-from urdfkin.compiled.preload import only
+from urdfkin.compiled.machine.single import make_single_evaluator
+from urdfkin.compiled.preload import use_only
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
@@ -33,7 +33,7 @@ METHODS = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "accelera
 
 @pytest.fixture(autouse=True)
 def _compiled() -> Iterator[None]:
-    with only("compiled"):
+    with use_only("compiled"):
         yield
 
 
@@ -66,7 +66,7 @@ def planted(robot: Robot, method: str, place: int, by: float) -> Any:
     """Return the checked function of a method with one number that is wrong by `by`, or by one ulp for 0."""
     frame = robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
-    compute, _ = single(method, plan, Reference.LOCAL_WORLD_ALIGNED)
+    compute, _ = make_single_evaluator(method, plan, Reference.LOCAL_WORLD_ALIGNED)
 
     def wrong(*given: Any) -> FloatArray | None:
         result = compute(*given)

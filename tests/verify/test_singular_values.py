@@ -446,7 +446,7 @@ def test_the_singularity_of_each_configuration_of_a_batch_is_available_by_index(
     robot = urdfkin.load("ur5")
     values = robot.singular_values([robot.neutral().tolist(), UR5], "tool0")
     assert [bool(values.singularity(k)) for k in (0, 1)] == [True, False]
-    assert values._sheet().parts[0].rows[0][-1] == "5 of 6"  # type: ignore[union-attr]
+    assert values._text_document().parts[0].rows[0][-1] == "5 of 6"  # type: ignore[union-attr]
     for sample in ((), (2,), (0, 0)):
         with pytest.raises(InputError, match="no such configuration"):
             values.singularity(*sample)
@@ -455,7 +455,7 @@ def test_the_singularity_of_each_configuration_of_a_batch_is_available_by_index(
 
 def test_a_batch_for_a_frame_that_no_joint_moves_is_shown_as_a_table() -> None:
     robot = urdfkin.load("planar_two_link")
-    assert len(robot.singular_values(np.zeros((2, 2)), "base")._sheet().parts[0].rows) == 2  # type: ignore[union-attr]
+    assert len(robot.singular_values(np.zeros((2, 2)), "base")._text_document().parts[0].rows) == 2  # type: ignore[union-attr]
 
 
 def test_results_are_shown_as_tables_in_a_notebook() -> None:

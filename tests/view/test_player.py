@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.report.browser import opened, require_chromium
 from tests.view.test_viewer import _PRESS, _until, shown_robot, without_shapes
-from urdfkin.robot.trajectory import line
+from urdfkin.robot.trajectory import make_line_trajectory
 from urdfkin.view.player import Player, as_gif, as_png
 from urdfkin.view.viewer import Viewer
 
@@ -22,7 +22,7 @@ viser = pytest.importorskip("viser")
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     robot = without_shapes("ur5")
-    motion = line(robot, np.zeros(6), np.full(6, 0.8), 0.4, 9)
+    motion = make_line_trajectory(robot, np.zeros(6), np.full(6, 0.8), 0.4, 9)
     with shown_robot(robot, trajectory=motion) as viewer:
         yield viewer
 

@@ -43,7 +43,7 @@ from urdfkin.calibration.write_back import UpdatedURDF
 from urdfkin.comparison.result import length
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
+from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_names, as_str, safe_repr
 from urdfkin.kinematics.inputs import as_finite, rotation_defect
 from urdfkin.kinematics.rotation import polar_factor, rotation_from_quaternion
 from urdfkin.model.configuration import parse_finite
@@ -51,7 +51,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import as_robot, load
 from urdfkin.robot.trajectory import read_arrays, read_columns
-from urdfkin.system.files import MOST_DATA, read_text
+from urdfkin.system.files import MAX_DATA_BYTES, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
@@ -469,7 +469,7 @@ def _add_identifiable(
 def _parse_noise(noise: tuple[float, float]) -> Noise:
     if not isinstance(noise, tuple | list) or len(noise) != 2:
         raise InputError("`noise` must be two numbers, in metres and radians", found=safe_repr(noise))
-    metres, radians = (real_number(one, "noise") for one in noise)
+    metres, radians = (as_finite_float(one, "noise") for one in noise)
     if min(metres, radians) <= 0.0:
         raise InputError(
             "`noise` must be positive",
@@ -631,14 +631,14 @@ def _table(
     units: Mapping[str, str],
     default_q: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    text, where = read_text(path, MOST_DATA, pipes=True), str(path)
+    text, where = read_text(path, MAX_DATA_BYTES, pipes=True), str(path)
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
     names = {cell.strip() for cell in first.split(",")}
     kind = _MATRIX if "T00" in names else _POSITION
     others = [name for name in coordinates if name not in required_coordinates]
     optional = [*others, "sample", "t", *(_QUATERNION if kind is _POSITION else _LAST_ROW)]
     required = [*required_coordinates, *kind]
-    data = read_columns(text, where, "measured poses", required, optional, named=True, units=units)
+    data = read_columns(text, where, "measured poses", required, optional, requires_header=True, units=units)
     s = len(data[kind[0]])
     values = [data.get(name, np.full(s, x)) for name, x in zip(coordinates, default_q, strict=True)]
     q = np.stack(values, axis=-1) if values else np.empty((s, 0))

@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.compiled.plan import turned
+from urdfkin.compiled.plan import axis_pose
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
@@ -227,7 +227,7 @@ class CalibrationModel:
             change = self._change(name, parameter_values)
             if (change != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
-                A = turned(joint)
+                A = axis_pose(joint)
                 origin = joint.T_parent_joint @ A @ change @ A.T
                 found[name] = origin if joint.lock is None else origin @ inverse(joint.lock.motion)
         return found
@@ -347,7 +347,7 @@ def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[st
     builder.add_base_or_tool("base")
     steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
-        A = turned(joint)
+        A = axis_pose(joint)
         only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)
         if backwards:
             builder.steps.append(A)

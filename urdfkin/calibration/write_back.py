@@ -18,7 +18,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
-from urdfkin.system.files import Edit, edited
+from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.findings import Reporter, Severity
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.records import JointRecord, Vector
@@ -47,7 +47,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
         if (joint := urdf.joints_by_name.get(name)) is None:
             raise InputError("the URDF has no such joint", found=repr(name))
         edits += _edits(report.data, joint, T)
-    return mark + edited(report.data, edits)
+    return mark + apply_edits(report.data, edits)
 
 
 def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:

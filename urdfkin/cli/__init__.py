@@ -16,7 +16,7 @@ import click
 
 from urdfkin.cli import streams
 from urdfkin.cli.exit import run
-from urdfkin.cli.streams import guard
+from urdfkin.cli.streams import wrap_streams
 from urdfkin.errors import UnknownNameError, UrdfkinError
 from urdfkin.verify.quantities import by_command
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
-#: A command is the function `NAME_command` of its module. `command_of` makes the commands of quantities.
+#: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -168,7 +168,7 @@ class LazyGroup(click.Group):
         module_name, _ = commands()[cmd_name]
         module = importlib.import_module(f"urdfkin.cli.{module_name}")
         command = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
-        return cast("click.Command", command or module.command_of(by_command()[cmd_name]))
+        return cast("click.Command", command or module.make_command(by_command()[cmd_name]))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -201,10 +201,10 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from urdfkin.system.lazy_import import own_version
+    from urdfkin.system.lazy_import import urdfkin_version
     from urdfkin.verify.pinocchio import pinocchio, version
 
-    click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
+    click.echo(f"urdfkin {urdfkin_version()}, Pinocchio {version()}")
     # If Pinocchio is not installed, this call raises an error.
     pinocchio()
     ctx.exit()
@@ -231,8 +231,8 @@ def cli() -> None:
 
 
 def main() -> None:
-    streams.prepare()
-    guard()
+    streams.prepare_streams()
+    wrap_streams()
     # For small matrices, OpenBLAS is fastest with one thread.
     # OpenBLAS reads this variable when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -12,18 +12,18 @@ import click
 from urdfkin.cli.options import (
     FILE,
     convention_of_input_option,
-    conversion_of,
+    find_conversion,
     load_robot,
     path_options,
     reject_unused_options,
     robot_argument,
 )
 from urdfkin.cli.output import (
-    TEXTS,
+    TEXT_FORMATS,
     Answer,
-    check_line,
+    certificate_exit_code,
     check_writable,
-    exit_code,
+    format_check_line,
     format_option,
     report_compilation,
 )
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
 
-_FORMS = (*TEXTS, "json")
+_FORMS = (*TEXT_FORMATS, "json")
 
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
@@ -165,7 +165,7 @@ def calibrate_command(
     certificate = written.certificate if calibration is None else calibration.certificate
     if certificate is None:
         answer()
-    answer(check_line(certificate), exit_code(certificate))
+    answer(format_check_line(certificate), certificate_exit_code(certificate))
 
 
 def _implausible(calibration: Calibration) -> ImplausibleError:
@@ -201,7 +201,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     source = table if isinstance(table, DHTable) else robot
     path = robot.chain(tip, base)
     names: Sequence[str] = path.joint_names if source is robot else source.joint_names
-    conversion = conversion_of(robot, options["convention"])
+    conversion = find_conversion(robot, options["convention"])
     coordinates, neutral = robot.coordinate_names if source is robot else names, None
     if conversion is not None:
         if source is not robot:
@@ -235,11 +235,11 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     if text is None:
         return None
-    metres, radians = numbers(text.split(","), "--noise", ["metres", "radians"])
+    metres, radians = parse_numbers(text.split(","), "--noise", ["metres", "radians"])
     return metres, radians
 
 

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import FOLDER
-from urdfkin.cli.output import console
+from urdfkin.cli.output import make_console
 from urdfkin.cli.streams import say
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
     from urdfkin.validation.collector import CampaignProgress, Progress
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 
 #: Minimum time (s) between two lines of text, and between two lines of JSON
-_LINES, _JSON = 10.0, 0.5
+_LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
 
-class Pace:
+class SpeedEstimator:
     """Estimates the speed of a validation in chunks per second, and the remaining time (s).
 
     A chunk is a part of the samples of one robot.
@@ -37,44 +37,46 @@ class Pace:
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
-    def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
+    def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
+        seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
         # The time before the first new result is not counted, because urdfkin may compile kernels then.
-        if fresh <= 0:
+        if new_chunks <= 0:
             self._begin = self._now()
-        if fresh <= 0 or seconds <= 0.0:
+        if new_chunks <= 0 or seconds <= 0.0:
             return None, None
-        rate = fresh / seconds
+        rate = new_chunks / seconds
         return rate, (state.chunks - state.chunks_done) / rate
 
 
 @contextmanager
 def progress(*, as_json: bool) -> Iterator[Progress]:
-    pace = Pace()
+    estimator = SpeedEstimator()
     if as_json:
-        with _at_intervals(_JSON, lambda state: _json(state, pace)) as tell:
-            yield tell
+        with _at_intervals(_JSON_INTERVAL, lambda state: _print_json(state, estimator)) as show_progress:
+            yield show_progress
     elif sys.stderr is not None and sys.stderr.isatty():
-        with _bar(pace) as tell:
-            yield tell
+        with _show_bar(estimator) as show_progress:
+            yield show_progress
     else:
-        with _at_intervals(_LINES, lambda state: say(f"urdfkin: {line(state, pace)}", err=True)) as tell:
-            yield tell
+        with _at_intervals(
+            _LINE_INTERVAL, lambda state: say(f"urdfkin: {format_progress(state, estimator)}", err=True)
+        ) as show_progress:
+            yield show_progress
 
 
-def line(state: CampaignProgress, pace: Pace) -> str:
+def format_progress(state: CampaignProgress, estimator: SpeedEstimator) -> str:
     earlier = (
         f" ({state.chunks_from_earlier_run:,} from an earlier run)" if state.chunks_from_earlier_run else ""
     )
     robots = f"{state.robots_done:,} of {state.robots:,} robots"
     chunks = f"{state.chunks_done:,} of {state.chunks:,} chunks{earlier}"
-    return f"{robots}, {chunks}; {_speed(state, pace)}{_failures(state)}; {state.label}"
+    return f"{robots}, {chunks}; {_format_speed(state, estimator)}{_format_failures(state)}; {state.label}"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Format a duration in seconds.
 
-    >>> duration(7), duration(100), duration(9000), duration(200_000)
+    >>> format_duration(7), format_duration(100), format_duration(9000), format_duration(200_000)
     ('7 s', '1 min 40 s', '2 h 30 min', '2 d 7 h')
     """
     whole = round(seconds)
@@ -85,24 +87,24 @@ def duration(seconds: float) -> str:
     return f"{whole} s"
 
 
-def _speed(state: CampaignProgress, pace: Pace) -> str:
-    rate, left = pace.of(state)
+def _format_speed(state: CampaignProgress, estimator: SpeedEstimator) -> str:
+    rate, left = estimator.estimate(state)
     if rate is None or left is None:
         return "no chunk computed yet, "
-    return f"{rate:.3g} chunks/s, {duration(left)} left, "
+    return f"{rate:.3g} chunks/s, {format_duration(left)} left, "
 
 
-def _failures(state: CampaignProgress) -> str:
+def _format_failures(state: CampaignProgress) -> str:
     return f"{state.failures:,} failed" if state.failures else "none failed"
 
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    as_json = seconds == _JSON
+    as_json = seconds == _JSON_INTERVAL
     last_time = -math.inf if as_json else time.monotonic()
     hidden: CampaignProgress | None = None
 
-    def tell(state: CampaignProgress) -> None:
+    def show_progress(state: CampaignProgress) -> None:
         nonlocal last_time, hidden
         hidden = state
         if time.monotonic() - last_time >= seconds:
@@ -110,20 +112,20 @@ def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> It
             show(state)
 
     try:
-        yield tell
+        yield show_progress
     finally:
         if hidden is not None and as_json:
             show(hidden)
 
 
-def _json(state: CampaignProgress, pace: Pace) -> None:
-    rate, left = pace.of(state)
+def _print_json(state: CampaignProgress, estimator: SpeedEstimator) -> None:
+    rate, left = estimator.estimate(state)
     data = asdict(state) | {"chunks_per_second": rate, "seconds_left": left}
     say(json.dumps(data), err=True)
 
 
 @contextmanager
-def _bar(pace: Pace) -> Iterator[Progress]:
+def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (
@@ -131,21 +133,21 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         MofNCompleteColumn(),
         TextColumn("chunks, {task.fields[words]} {task.description}", markup=False),
     )
-    with Progress(*columns, console=console(err=True), transient=True) as bar:
+    with Progress(*columns, console=make_console(err=True), transient=True) as bar:
         task = bar.add_task("", total=None, words="")
 
-        def tell(state: CampaignProgress) -> None:
-            speed = _speed(state, pace)
-            words = f"{state.robots_done}/{state.robots} robots, {speed}{_failures(state)},"
-            done, label = state.chunks_done, printable(state.label)
+        def show_progress(state: CampaignProgress) -> None:
+            speed = _format_speed(state, estimator)
+            words = f"{state.robots_done}/{state.robots} robots, {speed}{_format_failures(state)},"
+            done, label = state.chunks_done, escape_unprintable(state.label)
             bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
-        yield tell
+        yield show_progress
 
 
-_MOST_FAILED = 20
+_MAX_FAILED = 20
 #: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
-_MOST_CHUNKS = 200
+_MAX_CHUNKS = 200
 
 
 @click.command(
@@ -178,14 +180,14 @@ def status(context: click.Context, folder: Path) -> None:
     say(f"robots: {over:,} of {len(counts):,} done, {len(failed):,} of them failed")
     say(f"chunks: {finished:,} done, {missing:,} missing")
     _print_accuracy_progress(store, counts)
-    for robot in failed[:_MOST_FAILED]:
-        say(f"  failed: {manifest.robots[robot][0].command_line}{_reason(store, robot)}")
-    if len(failed) > _MOST_FAILED:
-        say(f"  and {len(failed) - _MOST_FAILED:,} more")
-    if missing and (seconds := _seconds_of_chunk(store, counts)) is not None:
+    for robot in failed[:_MAX_FAILED]:
+        say(f"  failed: {manifest.robots[robot][0].command_line}{_failure_reason(store, robot)}")
+    if len(failed) > _MAX_FAILED:
+        say(f"  and {len(failed) - _MAX_FAILED:,} more")
+    if missing and (seconds := _seconds_per_chunk(store, counts)) is not None:
         say(
-            f"remaining: {duration(missing * seconds)} on one processor, with {seconds:.2g} s for each chunk;"
-            " on n processors, divide the remaining time by n"
+            f"remaining: {format_duration(missing * seconds)} on one processor, with {seconds:.2g} s for each"
+            " chunk; on n processors, divide the remaining time by n"
         )
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
@@ -210,19 +212,19 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {format_count(len(robots), 'robot')} done")
 
 
-def _reason(store: Store, robot: int) -> str:
+def _failure_reason(store: Store, robot: int) -> str:
     from urdfkin.validation.answer import Failure
 
     answers = (store.read_answer(robot, index) for index in range(len(store.manifest.chunking)))
     return next((f": {answer.reason}" for answer in answers if isinstance(answer, Failure)), "")
 
 
-def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
+def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
     from urdfkin.validation.chunk import ChunkResult
 
     begun = [robot for robot, (done, _) in counts.items() if done]
     seconds = []
-    for robot in begun[:: max(1, len(begun) // _MOST_CHUNKS)][:_MOST_CHUNKS]:
+    for robot in begun[:: max(1, len(begun) // _MAX_CHUNKS)][:_MAX_CHUNKS]:
         answers = (store.read_answer(robot, index) for index in reversed(range(len(store.manifest.chunking))))
         seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
     return sum(seconds) / len(seconds) if seconds else None

@@ -26,12 +26,12 @@ from urdfkin.cli.options import (
     root_joint_option,
     source_options,
 )
-from urdfkin.cli.output import counted, write_output
+from urdfkin.cli.output import format_count, write_output
 from urdfkin.cli.shell import complete_code, complete_file
-from urdfkin.cli.streams import command_lines, harmless, say, say_styled
+from urdfkin.cli.streams import escape_for_terminal, print_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
-from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
-from urdfkin.system.git import Version, version_before
+from urdfkin.system.files import read_bytes, read_start, require_regular_file, write_file
+from urdfkin.system.git import CommitFiles, merge_base_files
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits
@@ -65,9 +65,9 @@ class CheckOutcome:
         silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
             comment.
         excerpts: For each finding, the faulty line of the file, and a line with carets below the fault.
-        known: Number of findings that the baseline file suppresses.
-        gone: Number of entries of the baseline file that no longer have a finding.
-        unsafe: Number of findings that only --unsafe-fixes would fix.
+        known_count: Number of findings that the baseline file suppresses.
+        obsolete_count: Number of entries of the baseline file that no longer have a finding.
+        unsafe_count: Number of findings that only --unsafe-fixes would fix.
     """
 
     files: list[str] = field(default_factory=list)
@@ -75,12 +75,12 @@ class CheckOutcome:
     silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     excerpts: list[str | None] = field(default_factory=list)
     errors: list[UrdfkinError] = field(default_factory=list)
-    unchanged: int = 0
-    known: int = 0
-    gone: int = 0
-    to_fix: int = 0
+    unchanged_count: int = 0
+    known_count: int = 0
+    obsolete_count: int = 0
+    fixable_count: int = 0
     patches: list[str] = field(default_factory=list)
-    unsafe: int = 0
+    unsafe_count: int = 0
 
     def add(self, file: str, found: Examination) -> None:
         formatter = ExcerptFormatter(found.data)
@@ -98,12 +98,12 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         click.echo(as_sarif(findings, version, outcome.silenced_findings))
     elif style == "github":
         if findings:
-            command_lines(as_github(findings))
+            print_commands(as_github(findings))
     elif statistics:
         for line in format_statistics(outcome.findings):
             say(line)
         _print_summary(outcome)
-    elif outcome.files or outcome.unchanged:
+    elif outcome.files or outcome.unchanged_count:
         _print_findings(outcome, excerpts=style == "terminal")
 
 
@@ -123,7 +123,7 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
     if len(fixes) > unsafe:
         say("[*] --fix fixes these findings; --diff prints the changes")
     if unsafe:
-        also = f"--unsafe-fixes also fixes {counted(unsafe, 'finding')}"
+        also = f"--unsafe-fixes also fixes {format_count(unsafe, 'finding')}"
         say(f"{also}, but rotates joints by more than a rounding error")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
@@ -133,15 +133,15 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
 def _print_summary(outcome: CheckOutcome) -> None:
     counts = [
         (len(outcome.silenced_findings), "silenced by comments: {}"),
-        (outcome.unchanged, "unchanged files: {}"),
-        (outcome.known, "already known: {}"),
-        (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
+        (outcome.unchanged_count, "unchanged files: {}"),
+        (outcome.known_count, "already known: {}"),
+        (outcome.obsolete_count, "listed in the baseline but no longer found: {}; write the baseline again"),
     ]
     details = ", ".join(text.format(count) for count, text in counts if count)
     say(format_summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
 
 
-def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
+def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
     for code in sorted({finding.code for finding in fixed}):
         same_code = [finding for finding in fixed if finding.code == code]
         turns = max(finding.fix.max_rotation for finding in same_code if finding.fix)
@@ -299,19 +299,22 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
         reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
-    run = _new_run(context.meta[_SETTINGS], options)
+    run = _make_run(context.meta[_SETTINGS], options)
     for word in files or ["."]:
         run.check_all(word, options["exclude"])
     outcome = run.outcome
     if (baseline := run.finding_filter.baseline) is not None:
-        outcome.known, outcome.gone = baseline.match_count, baseline.count_unmatched(outcome.files)
+        outcome.known_count, outcome.obsolete_count = (
+            baseline.match_count,
+            baseline.count_unmatched(outcome.files),
+        )
     if options["write_baseline"] is not None:
         _write_baseline(outcome, options["write_baseline"])
     if options["diff"]:
         write_output("".join(outcome.patches), options["output"])
-        more = f" ({outcome.unsafe} more with --unsafe-fixes)" if outcome.unsafe else ""
-        files_ = counted(len(outcome.files), "file")
-        say(f"{counted(outcome.to_fix, 'finding')} to fix in {files_}{more}", err=True)
+        more = f" ({outcome.unsafe_count} more with --unsafe-fixes)" if outcome.unsafe_count else ""
+        files_ = format_count(len(outcome.files), "file")
+        say(f"{format_count(outcome.fixable_count, 'finding')} to fix in {files_}{more}", err=True)
     elif options["write_baseline"] is None:
         _write_outcome(outcome, options["style"], options["output"], statistics=options["statistics"])
     for error in outcome.errors:
@@ -329,7 +332,7 @@ def _write_outcome(outcome: CheckOutcome, style: str, path: Path | None, *, stat
     write_file(path, text.getvalue().encode())
 
 
-def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
+def _make_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     writing = options["write_baseline"] is not None
     baseline = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
     since = options["changed_since"]
@@ -352,7 +355,7 @@ def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
         fix=options["fix"],
         diff=options["diff"],
         unsafe=options["unsafe_fixes"],
-        version=None if since is None else version_before(since, Path()),
+        version=None if since is None else merge_base_files(since, Path()),
         accepts_all=writing,
     )
 
@@ -380,11 +383,11 @@ class CheckRun:
     fix: bool
     diff: bool
     unsafe: bool
-    version: Version | None
+    version: CommitFiles | None
     accepts_all: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
-    _seen: set[str] = field(default_factory=set)
-    _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
+    _checked_files: set[str] = field(default_factory=set)
+    _has_changes: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
     def check_all(self, word: str, exclude: Sequence[str]) -> None:
         settings = self.finding_filter.settings
@@ -394,12 +397,12 @@ class CheckRun:
             self.outcome.errors.append(error)
             return
         for file in files:
-            if file not in self._seen:
-                self._seen.add(file)
+            if file not in self._checked_files:
+                self._checked_files.add(file)
                 try:
                     # A file that the user named directly may be a pipe.
                     if file not in (word, f"./{word}"):
-                        demand_regular(Path(file))
+                        require_regular_file(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
                     self.outcome.errors.append(error)
@@ -413,7 +416,7 @@ class CheckRun:
         if self.version is not None:
             before = find_known_findings(text, self.version, self.look)
             if before is None:
-                self.outcome.unchanged += 1
+                self.outcome.unchanged_count += 1
                 return
         if self.fix or self.diff:
             text = self._fix(file, text, lambda: self.finding_filter.make_independent_predicate(text, before))
@@ -424,7 +427,7 @@ class CheckRun:
     def _check_usd_or_mjcf(self, file: str) -> None:
         suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
-            self.outcome.unchanged += 1
+            self.outcome.unchanged_count += 1
             return
         from urdfkin.robot.loading import load
 
@@ -444,18 +447,18 @@ class CheckRun:
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
         self.outcome.add(file, Examination(text, data, None, findings, ()))
 
-    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
+    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
         """Return whether a file, and each file that it may include, is the same as in `version`.
 
         Every file of `version` with a suffix in `suffixes` counts as included. A deleted file also counts as
         included if its name occurs in the text.
         """
-        if suffixes not in self._changed:
-            self._changed[suffixes] = version.changed(suffixes)
-        if self._changed[suffixes]:
+        if suffixes not in self._has_changes:
+            self._has_changes[suffixes] = version.has_changes(suffixes)
+        if self._has_changes[suffixes]:
             return False
         data = read_bytes(Path(file))
-        return version.holds(data) and not any(os.fsencode(name) in data for name in version.gone)
+        return version.contains(data) and not any(os.fsencode(name) in data for name in version.missing_names)
 
     def _fix(self, file: str, text: UrdfText, choose: Any) -> UrdfText:
         path = None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
@@ -465,17 +468,17 @@ class CheckRun:
         for code, objection in result.unfixed_reasons.items():
             say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
-            self.outcome.to_fix += len(result.fixed_findings)
-            self.outcome.patches.append(make_patch(file, text.data, result.text.data, harmless))
+            self.outcome.fixable_count += len(result.fixed_findings)
+            self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
             chosen = choose()
-            self.outcome.unsafe += sum(
+            self.outcome.unsafe_count += sum(
                 chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe
                 for f in self.look(result.text).findings
             )
             return text
         if result.fixed_findings:
             write_file(path, result.text.data)
-            _say_fixed(file, result.fixed_findings)
+            _report_fixes(file, result.fixed_findings)
         return result.text
 
     def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
@@ -491,7 +494,7 @@ class CheckRun:
         if self.outcome.errors:
             return 2
         if self.diff:
-            return int(self.outcome.to_fix > 0)
+            return int(self.outcome.fixable_count > 0)
         has_error = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
         return int(has_error and not self.accepts_all)
 
@@ -519,4 +522,4 @@ def _write_baseline(outcome: CheckOutcome, path: Path) -> None:
         return
     write_file(path, baseline_text(outcome.findings, outcome.files, path).encode())
     count = sum(finding.count for finding in outcome.findings)
-    say(f"wrote {path}: {counted(count, 'finding')} in the baseline", err=True)
+    say(f"wrote {path}: {format_count(count, 'finding')} in the baseline", err=True)

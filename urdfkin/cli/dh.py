@@ -13,14 +13,14 @@ from urdfkin.cli.options import (
     FiniteNumber,
     combine,
     digits_option,
-    is_given,
+    is_on_command_line,
     load_robot,
     path_options,
     reject_unused_options,
     robot_argument,
     verify_option,
 )
-from urdfkin.cli.output import Answer, report_compilation, writes_answer
+from urdfkin.cli.output import Answer, answer_command, report_compilation
 from urdfkin.cli.shell import complete_table
 
 #: Copy of `urdfkin.dh.export.FORMATS`; the import of that module would slow --help down
@@ -186,7 +186,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 @compare_options
 @form_options
 @verify_option
-@writes_answer(*FORMATS, suffixes=_SUFFIXES)
+@answer_command(*FORMATS, suffixes=_SUFFIXES)
 def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
@@ -202,16 +202,18 @@ def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     the fitted base, tool and joint offsets hide a mistake. 2: bad input. 3: not checked, or the rounding
     error of a strict table is larger than that of the robot.
     """
-    from urdfkin.cli.dh_tables import DHRequest, run
+    from urdfkin.cli.dh_tables import DHRequest, make_dh_answer
     from urdfkin.dh.parse_table import is_table_file
 
     context, is_table = click.get_current_context(), is_table_file(robot)
     options["format_"] = context.params["format_"]
     _reject_unused(context, is_table, options)
     loaded = load_robot(robot, verify=verify)
-    unchanged = robot if is_table and not any(is_given(context, name) for name in _DERIVING) else None
-    if (unchanged or options["like"]) and not is_given(context, "convention"):
+    unchanged = (
+        robot if is_table and not any(is_on_command_line(context, name) for name in _DERIVING) else None
+    )
+    if (unchanged or options["like"]) and not is_on_command_line(context, "convention"):
         options["convention"] = None
     with report_compilation():
         choices = {name: options.pop(name) for name in ("near_parallel", "slide", *_SIGNS)}
-        return run(DHRequest(robot=loaded, unchanged=unchanged, choices=choices, **options))
+        return make_dh_answer(DHRequest(robot=loaded, unchanged=unchanged, choices=choices, **options))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.cli.options import locked_joints, locked_line
-from urdfkin.cli.output import Answer, check_of_path
+from urdfkin.cli.options import lock_settings, locked_line
+from urdfkin.cli.output import Answer, format_path_check
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
@@ -19,26 +19,37 @@ from urdfkin.dh.compare import (
     Mistake,
     TableComparison,
     compare,
-    convention_that_fits,
-    diagnose,
+    comparison_document,
     fast_fit_errors,
+    find_better_interpretation,
+    find_dh_convention,
 )
-from urdfkin.dh.compare import document as comparison_document
 from urdfkin.dh.convert import to_urdf
 from urdfkin.dh.export.data import to_mapping
-from urdfkin.dh.export.text import printed
-from urdfkin.dh.parse_table import published, read_mapping, read_table_or_screws, reference_path, table_of
-from urdfkin.dh.rows import last_digits
+from urdfkin.dh.export.text import measure_printed_table
+from urdfkin.dh.parse_table import (
+    parse_table_data,
+    read_mapping,
+    read_table_or_screws,
+    reference_path,
+    suggest_published_tables,
+)
+from urdfkin.dh.rows import half_digits_by_row
 from urdfkin.dh.snapping import snap_hint
-from urdfkin.dh.tree_parameters import as_csv, as_mapping, printed_tree, tree_parameters
-from urdfkin.dh.tree_parameters import document as tree_document
-from urdfkin.dh.units import Angles, Lengths
+from urdfkin.dh.tree_parameters import (
+    as_csv,
+    as_mapping,
+    make_tree_parameters,
+    measure_printed_tree,
+    tree_document,
+)
+from urdfkin.dh.units import AngleUnit, LengthUnit
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import draw_samples
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home
+from urdfkin.system.files import expand_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
@@ -81,14 +92,14 @@ class DHRequest:
     @property
     def units(self) -> Units:
         return Units(
-            Angles.DEGREES if self.degrees else Angles.RADIANS,
-            Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
+            AngleUnit.DEGREES if self.degrees else AngleUnit.RADIANS,
+            LengthUnit.MILLIMETRES if self.millimetres else LengthUnit.METRES,
             self.digits,
             self.columns,
         )
 
 
-def run(request: DHRequest) -> Answer:
+def make_dh_answer(request: DHRequest) -> Answer:
     modes = {"--all": request.all_, "--tree": request.tree, "--compare": request.compare}
     chosen = [name for name, value in modes.items() if value]
     if len(chosen) > 1:
@@ -120,25 +131,25 @@ def _write_tables(request: DHRequest) -> Answer:
     checks = [verifier.table(table) if verifier.policy else None for table in tables]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
-        lock = locked_joints(request.robot)
+        lock = lock_settings(request.robot)
         documents = [
-            {**to_mapping(table), **lock, "checked": check_of_path(check)[0]} for table, check in results
+            {**to_mapping(table), **lock, "checked": format_path_check(check)[0]} for table, check in results
         ]
         text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(request, table, check) for table, check in results)
     if format_ not in (*_PRINTED, "json"):
         for table, check in results:
-            for line in _lines_below(request, table, check):
+            for line in _lines_below_table(request, table, check):
                 say(line, err=True)
     code = 0 if all(check is not None and check.within for check in checks) else 3
-    return _answer(request, text, code)
+    return _make_answer(request, text, code)
 
 
 def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
-        table = read_table_or_screws(at_home(request.unchanged))
+        table = read_table_or_screws(expand_home(request.unchanged))
         # If the file contains screws, `Robot.dh` derives a table at the end of this function.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
@@ -162,27 +173,27 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
         return draw_table_svg(table)
     text = export(table, request.format_, request.units, verify=bool(request.robot.verifier.policy))
     if request.format_ in _PRINTED:
-        return "\n".join([text, *_lines_below(request, table, check), ""])
+        return "\n".join([text, *_lines_below_table(request, table, check), ""])
     return text
 
 
-def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    yield check_of_path(check)[0]
+def _lines_below_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
+    yield format_path_check(check)[0]
     yield from _locked_lines(request)
     if request.format_ in _ROUNDED:
-        yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")
+        yield from str(measure_printed_table(table, request.units, _ROUNDED[request.format_])).split("\n")
     if request.unchanged is None and (
         hint := snap_hint(table, lambda snap: _make_table(request, table.tip_frame, snap))
     ):
         yield f"hint: {hint}"
     if request.like is None and request.format_ in _PRINTED:
-        yield from (f"hint: {line}" for line in published(request.robot.origin.source))
+        yield from (f"hint: {line}" for line in suggest_published_tables(request.robot.origin.source))
 
 
 def _locked_lines(request: DHRequest) -> list[str]:
     form = request.format_ if request.format_ in _PRINTED else "terminal"
     line = locked_line(request.robot)
-    return [TextDocument("", [line]).written(form).rstrip("\n")] if line else []
+    return [TextDocument("", [line]).render(form).rstrip("\n")] if line else []
 
 
 # -- the whole tree ------------------------------------------------------------------------------------
@@ -191,21 +202,21 @@ def _locked_lines(request: DHRequest) -> list[str]:
 def _write_tree(request: DHRequest) -> Answer:
     robot, format_ = request.robot, request.format_
     _require_format(request, "--tree", (*_TEXTS, "csv", "json"))
-    parameters = tree_parameters(robot.tree)
+    parameters = make_tree_parameters(robot.tree)
     if format_ == "json":
-        text = json.dumps(as_mapping(parameters) | locked_joints(robot), indent=2, allow_nan=False) + "\n"
+        text = json.dumps(as_mapping(parameters) | lock_settings(robot), indent=2, allow_nan=False) + "\n"
     elif format_ == "csv":
         text = as_csv(parameters)
     else:
-        text = tree_document(parameters, request.units).written(format_)
+        text = tree_document(parameters, request.units).render(format_)
     check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
-    check_line = "\n".join([str(check or check_of_path(None)[0]), *_locked_lines(request)])
+    check_line = "\n".join([str(check or format_path_check(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
         q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
-        text += f"\n{check_line}\n{printed_tree(parameters, request.units, q)}\n"
+        text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)
-    return _answer(request, text, 0 if check is not None else 3)
+    return _make_answer(request, text, 0 if check is not None else 3)
 
 
 # -- a comparison --------------------------------------------------------------------------------------
@@ -220,29 +231,29 @@ def _compare(request: DHRequest, name: str) -> Answer:
     chain, tolerance = request.robot.chain(tip, base), request.tolerance / 1e3
     notes: list[str] = []
     if "convention" not in data:
-        convention = convention_that_fits(chain, data, tolerance, str(path))
+        convention = find_dh_convention(chain, data, tolerance, str(path))
         data = {**data, "convention": convention}
         notes = [
             f"The table names no convention; {convention} fits best. Write the convention into the table."
         ]
     try:
-        reference = table_of(data, str(path))
+        reference = parse_table_data(data, str(path))
     except InputError as error:
-        if mistake := diagnose(chain, data, tolerance):
+        if mistake := find_better_interpretation(chain, data, tolerance):
             error.remedy = f"{error.remedy}; {mistake}" if error.remedy else str(mistake)
         raise
-    found = compare(chain, reference, tolerance, fit=request.fit, digits=last_digits(data))
+    found = compare(chain, reference, tolerance, fit=request.fit, half_digits=half_digits_by_row(data))
     mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
-        data = _comparison(found, reference, mistake) | locked_joints(request.robot)
+        data = _comparison_data(found, reference, mistake) | lock_settings(request.robot)
         text = json.dumps(data, indent=2, allow_nan=False) + "\n"
     else:
         document = comparison_document(found, request.units)
         hints = ["", f"hint: {mistake}"] if mistake else []
         lock = [line] if (line := locked_line(request.robot)) else []
         parts = [*notes, *lock, Strong(document.title), *document.parts, *hints]
-        text = TextDocument("", parts).written(request.format_)
-    return _answer(request, text, 0 if found.passes else 1)
+        text = TextDocument("", parts).render(request.format_)
+    return _make_answer(request, text, 0 if found.passes else 1)
 
 
 def _better_interpretation(
@@ -251,19 +262,20 @@ def _better_interpretation(
     if found.agrees or found.mistakes:
         return None
     metres = found.metres
-    if not found.fitted:
-        # `diagnose` fits every interpretation, so the interpretation of the file is fitted too.
+    if not found.is_fitted:
+        # `find_better_interpretation` fits every interpretation, so the interpretation of the file is fitted
+        # too.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None
-    return diagnose(chain, data, found.tolerance, metres)
+    return find_better_interpretation(chain, data, found.tolerance, metres)
 
 
 def _frame_of_robot(request: DHRequest, name: object) -> str | None:
     return name if isinstance(name, str) and name in request.robot.frame_names else None
 
 
-def _comparison(
+def _comparison_data(
     found: TableComparison, reference: DHTable, mistake: BetterInterpretation | None
 ) -> dict[str, Any]:
     return {
@@ -273,11 +285,11 @@ def _comparison(
         "read_as": str(reference.convention),
         "tip_off_at_most_m": found.metres,
         "tip_turned_at_most_rad": found.radians,
-        "proven_tip_off_at_most_m": found.most_metres,
-        "proven_tip_turned_at_most_rad": found.most_radians,
+        "proven_tip_off_at_most_m": found.metres_bound,
+        "proven_tip_turned_at_most_rad": found.radians_bound,
         "proven_if": found.condition or None,
-        "as_written_tip_off_at_most_m": found.written_metres,
-        "as_written_tip_turned_at_most_rad": found.written_radians,
+        "as_written_tip_off_at_most_m": found.unfitted_metres,
+        "as_written_tip_turned_at_most_rad": found.unfitted_radians,
         "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},
         "tool_took_up": {"metres": found.tool.metres, "radians": found.tool.radians},
         "residual_m": found.residual,
@@ -285,36 +297,36 @@ def _comparison(
         "senses": list(found.senses),
         "offsets": list(found.offsets),
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
-        "differences": [_difference(one) for one in found.differences],
-        "likely_mistakes": [_mistake(one) for one in found.mistakes],
+        "differences": [_difference_data(one) for one in found.differences],
+        "likely_mistakes": [_mistake_data(one) for one in found.mistakes],
         "would_fit_read_as": mistake and mistake.as_mapping(),
-        "without_fitting": [_difference(one) for one in found.instead],
+        "without_fitting": [_difference_data(one) for one in found.unfitted_differences],
         "fitted": to_mapping(found.reference),
     }
 
 
-def _difference(one: CellDifference) -> dict[str, Any]:
+def _difference_data(one: CellDifference) -> dict[str, Any]:
     return {
         "row": one.row + 1,
         "joint": one.joint,
         "cell": one.cell,
         "table": one.reference,
         "urdf": one.urdf,
-        "tip_m": one.tip,
+        "tip_m": one.tip_displacement,
         "within_last_digit": one.is_rounding,
     }
 
 
-def _mistake(one: Mistake) -> dict[str, Any]:
+def _mistake_data(one: Mistake) -> dict[str, Any]:
     return {
         "kind": str(one.kind),
         "rows": [row + 1 for row in one.rows],
-        "cell": one.cell and _difference(one.cell),
-        "still_fitted": asdict(one.fitted),
+        "cell": one.cell and _difference_data(one.cell),
+        "still_fitted": asdict(one.fit_changes),
         "tip_off_at_most_m": one.metres,
         "tip_turned_at_most_rad": one.radians,
     }
 
 
-def _answer(request: DHRequest, text: str, code: int) -> Answer:
+def _make_answer(request: DHRequest, text: str, code: int) -> Answer:
     return Answer(lambda: TextDocument(""), {request.format_: lambda: text}, code=code)

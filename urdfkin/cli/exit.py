@@ -29,16 +29,16 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 class Stop:
     signal: int | None = None
 
-    def exit_code(self, otherwise: int) -> int:
+    def exit_code(self, default: int) -> int:
         """Return 128 + the number of the signal that stopped the command, as shells do.
 
-        Return `otherwise` if no signal stopped the command, or if `otherwise` is 1 (a disagreement).
+        Return `default` if no signal stopped the command, or if `default` is 1 (a disagreement).
         """
-        return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
+        return default if self.signal is None or default == 1 else 128 + self.signal
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
+def handle_signals() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
     # `nohup` makes a process ignore SIGHUP, and a new handler would end this.
@@ -63,8 +63,8 @@ def stoppable() -> Iterator[Stop]:
 
 
 #: Exit code EX_SOFTWARE of sysexits.h
-CRASH = 70
-_INTERRUPTED = 128 + signal.SIGINT
+CRASH_EXIT_CODE = 70
+_INTERRUPTED_EXIT_CODE = 128 + signal.SIGINT
 
 
 def run(command: click.Command, name: str) -> int:
@@ -78,12 +78,12 @@ def run(command: click.Command, name: str) -> int:
         try:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:
-            streams.finish()
+            streams.flush_output()
     except click.ClickException as error:
         return _report_usage_error(error)
     except click.Abort:
         click.echo("urdfkin: interrupted", err=True)
-        return _INTERRUPTED
+        return _INTERRUPTED_EXIT_CODE
     except UrdfkinError as error:
         return report_error(error)
     except Exception as error:
@@ -112,7 +112,8 @@ def report_crash(error: Exception) -> int:
     click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     click.echo(
         f"urdfkin: this is a defect of urdfkin, not of your input: {type(error).__name__}."
-        f" Please report it in urdfkin's repository, with the lines above and the command (exit {CRASH}).",
+        " Please report it in urdfkin's repository, with the lines above and the command"
+        f" (exit {CRASH_EXIT_CODE}).",
         err=True,
     )
-    return CRASH
+    return CRASH_EXIT_CODE

@@ -21,17 +21,17 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 def answers() -> dict[str, str]:
     """Map the anchor of each heading in docs/questions.md to the section, with links removed."""
-    return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
+    return {make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
-def answer_to(topic: str) -> str | None:
+def find_answer(topic: str) -> str | None:
     """Return the section with the anchor `topic`, or the only one whose anchor has all words of `topic`."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
-def as_text(answer: str) -> str:
+def format_answer(answer: str) -> str:
     """Format a section for a terminal, with the setup code of its examples at the end."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
@@ -46,7 +46,7 @@ def as_text(answer: str) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def anchor(heading: str) -> str:
+def make_anchor(heading: str) -> str:
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
@@ -85,8 +85,8 @@ def explain_command(topic: str | None) -> None:
         click.echo(equation)
     elif (match := _find_rule(topic)) is not None:
         click.echo(explain(match))
-    elif (answer := answer_to(topic)) is not None:
-        click.echo(as_text(answer))
+    elif (answer := find_answer(topic)) is not None:
+        click.echo(format_answer(answer))
     else:
         names = [name for rule in rules for name in (rule.id, rule.slug)]
         raise UnknownNameError("code, equation or question", topic, [*names, *answers()])

@@ -24,12 +24,12 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import (
     Answer,
-    check_line,
-    counted,
-    exit_code,
+    answer_command,
+    certificate_exit_code,
+    format_check_line,
+    format_count,
     output_option,
     write_output,
-    writes_answer,
 )
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
@@ -107,19 +107,19 @@ def export_command(
         )
         context.exit(_check(file))
     from urdfkin.export import code_in, write
-    from urdfkin.export.forms import code_of_robot
+    from urdfkin.export.forms import make_robot_code
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
-    code = code_in(code_of_robot(loaded, frame, names, reference, form, name=name, verify=verify), to)
+    code = code_in(make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to)
     write_output(write(code, to), output)
     proof = code.proof
-    say(check_line(proof.certificate), err=True)
+    say(format_check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:
-        say(f"The expressions were evaluated {proof.evaluated}. {proof.constants}", err=True)
-    context.exit(exit_code(proof.certificate))
+        say(f"The expressions were evaluated {proof.precision_text}. {proof.constants}", err=True)
+    context.exit(certificate_exit_code(proof.certificate))
 
 
 def _check(file: Path) -> int:
@@ -128,9 +128,9 @@ def _check(file: Path) -> int:
     found = check(file)
     for line in found.lines:
         say(line)
-    if not found.good:
+    if not found.passed:
         return 1
-    for reason in found.doubts:
+    for reason in found.warnings:
         say(f"UNVERIFIED: {reason}", err=True)
     return 0 if found.verified else 3
 
@@ -157,9 +157,9 @@ def vectors_command() -> None:
     help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
     " files of example-robot-data.",
 )
-@samples_option(3, "Number of configurations of each robot; the first one is zero.", least=1, most=1000)
+@samples_option(3, "Number of configurations of each robot; the first one is zero.", minimum=1, maximum=1000)
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
-@writes_answer()
+@answer_command()
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
@@ -212,6 +212,6 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
 
 def _document(folder: Path, written: Sequence[VectorFiles]) -> TextDocument:
     rows = [(one.robot, one.files[0].name, f"{one.numbers:,}") for one in written]
-    robots = counted(len(written), "robot")
+    robots = format_count(len(written), "robot")
     total = f"{sum(one.numbers for one in written):,} numbers of {robots} in {folder}"
     return TextDocument("", [Table(("robot", "file", "numbers"), rows, left=2, names=(0, 1)), total])

@@ -14,7 +14,7 @@ from urdfkin.cli.options import (
     NumberInRange,
     WholeNumber,
     load_robot,
-    load_several,
+    load_robots,
     markdown_option,
     reject_unused_options,
     robot_argument,
@@ -23,7 +23,7 @@ from urdfkin.cli.options import (
     seed_option,
     source_options,
 )
-from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, report_compilation
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import Table, TextDocument
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 #: Options of `urdfkin same` that need exactly two robots
-_OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
+_TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
 @click.command("same", epilog="Example: urdfkin same ur5 ur5_limited --certificate same.json")
@@ -92,7 +92,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 )
 @schema_option("urdfkin.comparison.certificate:SAME", "a certificate")
 @source_options
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def same_command(
     a: str | None,
     b: str | None,
@@ -123,26 +123,26 @@ def same_command(
     differences without effect on motion, such as limits. 2: bad input. With --within, the command does not
     change B before the comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
-    from urdfkin.comparison.bounds import MOST_BOXES
+    from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate
     from urdfkin.comparison.result import SameQuestion
-    from urdfkin.comparison.verdict import parse_map, same
+    from urdfkin.comparison.verdict import parse_joint_pairs, same
     from urdfkin.model.conventions import as_toml
     from urdfkin.report.same import as_html, command_of, document, markdown_of
 
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
-    question, most_boxes = SameQuestion(within, strict), MOST_BOXES if boxes is None else boxes
+    question, most_boxes = SameQuestion(within, strict), MAX_BOXES if boxes is None else boxes
     if more:
-        reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
+        reject_unused_options(click.get_current_context(), _TWO_ROBOT_OPTIONS, "with more than two robots")
         return _all_pairs((a, b, *more), question, most_boxes)
-    first, second = load_several(a, b)
+    first, second = load_robots(a, b)
     robots = first, second
     with report_compilation():
         if recheck is not None:
             return _recheck(robots, recheck)
-        found = same(*robots, map=parse_map(pairs), boxes=most_boxes, within=within)
+        found = same(*robots, map=parse_joint_pairs(pairs), boxes=most_boxes, within=within)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
     forms: dict[str, Callable[[], str]] = {
@@ -164,7 +164,7 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
     from urdfkin.comparison.verdict import same
     from urdfkin.report.same import command_of, pairs_document, pairs_markdown
 
-    robots = load_several(*sources)
+    robots = load_robots(*sources)
     pairs = list(combinations(robots, 2))
     with report_compilation():
         found = [same(*pair, boxes=boxes, within=question.within) for pair in pairs]
@@ -182,13 +182,15 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
-    from urdfkin.comparison.certificate import SAME, recheck, words_of
+    from urdfkin.comparison.certificate import SAME, difference_text, recheck
 
     certificate = SAME.read(path)
     errors = recheck(certificate, *robots)
     for line in errors:
         say(line, err=True)
-    first = [f"; first difference: {words_of(difference)}" for difference in certificate["differences"][:1]]
+    first = [
+        f"; first difference: {difference_text(difference)}" for difference in certificate["differences"][:1]
+    ]
     holds = f"the certificate holds: {certificate['verdict']}{''.join(first)}"
     words = "the certificate does not hold" if errors else holds
     code = int(bool(errors) or certificate["verdict"] == "differs")
@@ -202,7 +204,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.option("--effects/--no-effects", default=True, help="Compute how far each change can move the frames.")
 @markdown_option
 @source_options
-@writes_answer()
+@answer_command()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
@@ -227,7 +229,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     )
 
     check_writable(markdown)
-    robots = load_several(a, b, *more)
+    robots = load_robots(a, b, *more)
     with report_compilation():
         found = [diff(*pair, effects=effects) for pair in combinations(robots, 2)]
 
@@ -247,7 +249,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     if more:
         return Answer(lambda: pairs_document(found), data, code=code)
     lines = TextDocument("", lines_of(found[0]))
-    return Answer(lambda: document(found[0]), data, code=code, fitted=lambda _: lines)
+    return Answer(lambda: document(found[0]), data, code=code, fit_document=lambda _: lines)
 
 
 @click.command("readers", epilog="Example: urdfkin readers ur5 --with mujoco,yourdfpy")
@@ -261,7 +263,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 )
 @samples_option(5, "Number of random configurations, in addition to q = 0.")
 @seed_option
-@writes_answer()
+@answer_command()
 def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
     """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
 
@@ -290,10 +292,12 @@ def readers_command(robot: str, libraries: str | None, samples: int, seed: int) 
 
     data = {"robot": loaded.name, "readers": [reading.as_dict() for reading in found]}
     code = int(not all(reading.agrees for reading in found))
-    return Answer(lambda: _readings(loaded.name, found), {"json": lambda: data, "csv": lines}, code=code)
+    return Answer(
+        lambda: _readings_document(loaded.name, found), {"json": lambda: data, "csv": lines}, code=code
+    )
 
 
-def _readings(name: str, found: tuple[LibraryReading, ...]) -> TextDocument:
+def _readings_document(name: str, found: tuple[LibraryReading, ...]) -> TextDocument:
     rows = [(f"{reading.library} {reading.version}", *_cells(reading)) for reading in found]
     parts: list[Table | str] = [Table(("library", "poses", "joints"), rows, left=3)]
     differences = [

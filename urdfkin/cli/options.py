@@ -19,9 +19,9 @@ import click
 from urdfkin.cli.shell import complete_frame, complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
-from urdfkin.errors.numbers import parse_float, parse_int, remedy
+from urdfkin.errors.numbers import number_remedy, parse_float, parse_int
 from urdfkin.model.reference import Reference
-from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
+from urdfkin.system.files import MAX_DATA_BYTES, read_standard_input, read_text, shorten_path
 from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class WholeNumber(click.IntRange):
 class FiniteNumber(click.types.FloatParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_float(value) is None:
-            hint = remedy(value)
+            hint = number_remedy(value)
             self.fail(f"{value!r} is not a finite number{f': {hint}' if hint else ''}.", param, ctx)
         return super().convert(value, param, ctx)
 
@@ -56,7 +56,7 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 
 
 def format_from_suffix(
-    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], without_suffix: str
+    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], default_format: str
 ) -> str:
     """Return the output format; raise InputError if --format contradicts the suffix of the output file.
 
@@ -65,16 +65,16 @@ def format_from_suffix(
     format_: str = context.params["format_"]
     if output is None:
         return format_
-    chosen = is_given(context, "format_")
+    chosen = is_on_command_line(context, "format_")
     suffix = output.suffix.lower()
     if suffix not in formats:
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
-                where=shortened(output),
+                where=shorten_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
-        return format_ if chosen else without_suffix
+        return format_ if chosen else default_format
     if not chosen:
         return formats[suffix][0]
     if format_ not in formats[suffix]:
@@ -86,14 +86,14 @@ def format_from_suffix(
     return format_
 
 
-def is_given(context: click.Context, name: str) -> bool:
+def is_on_command_line(context: click.Context, name: str) -> bool:
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
     """Raise InputError, such as "--format does nothing with --opw", for an option without effect."""
     for parameter in context.command.params:
-        if parameter.name in unused and is_given(context, parameter.name):
+        if parameter.name in unused and is_on_command_line(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
             raise InputError(f"{name} does nothing {because}", remedy="leave out this option")
 
@@ -130,7 +130,9 @@ def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bo
     return store
 
 
-def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
+def _make_pair_reader(
+    separator: str, form: str, *, needs_value: bool
+) -> Callable[[Sequence[str]], dict[str, str]]:
     def read(words: Sequence[str]) -> dict[str, str]:
         pairs = {}
         for word in words:
@@ -153,7 +155,9 @@ source_options = combine(
         multiple=True,
         metavar="NAME:=VALUE",
         expose_value=False,
-        callback=_store_as("xacro_args", _read_pairs(":=", "NAME:=VALUE", needs_value=False), always=True),
+        callback=_store_as(
+            "xacro_args", _make_pair_reader(":=", "NAME:=VALUE", needs_value=False), always=True
+        ),
         help="Argument of a .xacro file; repeatable. The file is expanded in a restricted process.",
     ),
     click.option(
@@ -161,7 +165,7 @@ source_options = combine(
         multiple=True,
         metavar="SET=NAME",
         expose_value=False,
-        callback=_store_as("variant", _read_pairs("=", "SET=NAME", needs_value=True)),
+        callback=_store_as("variant", _make_pair_reader("=", "SET=NAME", needs_value=True)),
         help="Select a variant of a USD file; repeatable.",
     ),
     click.option(
@@ -257,8 +261,10 @@ def oracle_option(help_: str = "Library that checks each result.") -> Callable[[
 seed_option = click.option("--seed", type=WholeNumber(0), default=0, help="Seed of the random values.")
 
 
-def samples_option(default: int, help_: str, least: int = 0, most: int | None = None) -> Callable[[_F], _F]:
-    return click.option("--samples", type=WholeNumber(least, most), default=default, help=help_)
+def samples_option(
+    default: int, help_: str, minimum: int = 0, maximum: int | None = None
+) -> Callable[[_F], _F]:
+    return click.option("--samples", type=WholeNumber(minimum, maximum), default=default, help=help_)
 
 
 def _values_option(name: str, help_: str) -> Callable[[_F], _F]:
@@ -310,7 +316,7 @@ def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
     return click.option("--schema", is_flag=True, expose_value=False, callback=show, help=help_)
 
 
-def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
+def find_conversion(robot: Robot, name: str | None) -> Conversion | None:
     return None if name is None else robot.convention(name)
 
 
@@ -326,7 +332,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 def warn_of_motion(motion: Trajectory) -> None:
     for note in motion.notes:
         say(f"warning: {note}", err=True)
-    if motion.rates != "as given":
+    if motion.rates_source != "as given":
         say(f"rates {motion.derivation()}", err=True)
 
 
@@ -335,7 +341,7 @@ def warn_of_limits(robot: Robot, q: FloatArray) -> None:
         say(f"warning: {line}", err=True)
 
 
-def locked_joints(robot: Robot) -> dict[str, Any]:
+def lock_settings(robot: Robot) -> dict[str, Any]:
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -379,7 +385,7 @@ class Inputs:
     def velocity_names(self) -> tuple[str, ...]:
         return (self.conversion or self.robot).velocity_names
 
-    def converted(self) -> Inputs:
+    def convert_inputs(self) -> Inputs:
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
@@ -402,7 +408,7 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
     return robot
 
 
-def load_several(*sources: str) -> tuple[Robot, ...]:
+def load_robots(*sources: str) -> tuple[Robot, ...]:
     from urdfkin.urdf.sources import is_usd, is_xacro
 
     if sources.count("-") > 1:
@@ -446,7 +452,7 @@ def read_inputs(
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
     warn_of_limits(robot, q_)
-    settings = locked_joints(robot)
+    settings = lock_settings(robot)
     return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, settings=settings, conversion=conversion)
 
 
@@ -501,10 +507,10 @@ def read_batch(
     """
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_columns, width_of
+    from urdfkin.robot.trajectory import count_cells, read_columns
 
-    text = _read_stdin() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
-    width = width_of(text, str(path)) if len(layouts) > 1 else None
+    text = _read_stdin() if str(path) == "-" else read_text(path, MAX_DATA_BYTES, pipes=True)
+    width = count_cells(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
     rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
@@ -519,7 +525,7 @@ def read_batch(
 
 def _read_stdin() -> str:
     try:
-        return read_standard_input(MOST_DATA).decode("utf-8-sig")
+        return read_standard_input(MAX_DATA_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError("cannot be read", where="-", found=f"text that is not UTF-8 ({error})") from None
 
@@ -581,13 +587,13 @@ def with_base(
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
     import numpy as np
 
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)
     cells = text.split(",")
     names = next((names for names in layouts if len(names) == len(cells)), layouts[0])
-    return np.array([numbers(cells, option, names)]), names
+    return np.array([parse_numbers(cells, option, names)]), names
 
 
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:

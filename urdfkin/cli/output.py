@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from urdfkin.verify.certificate import Certificate
 
-TEXTS = ("table", "markdown", "html", "latex")
+TEXT_FORMATS = ("table", "markdown", "html", "latex")
 _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
@@ -60,24 +60,25 @@ class Answer:
     """The result of a command.
 
     Attributes:
-        document: Function that returns a document with texts and tables, for the formats in `TEXTS`.
+        document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
-            array for npy, or the output as text. If `data` has a function for a format in `TEXTS`, this
-            function is used instead of `document`.
+            array for npy, or the output as text. If `data` has a function for a format in `TEXT_FORMATS`,
+            this function is used instead of `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
-        fitted: Function that returns a document that fits the width of a terminal. None: use `document`.
+        fit_document: Function that returns a document that fits the width of a terminal. None: use
+        `document`.
     """
 
     document: Callable[[], TextDocument]
     data: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
     check: str = ""
     code: int = 0
-    fitted: Callable[[Console], TextDocument] | None = None
+    fit_document: Callable[[Console], TextDocument] | None = None
 
     def show(self, out: Console) -> None:
         from urdfkin.report.listing import print_document
 
-        print_document(out, self.document() if self.fitted is None else self.fitted(out))
+        print_document(out, self.document() if self.fit_document is None else self.fit_document(out))
         if self.check:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
@@ -92,11 +93,11 @@ class Answer:
         document = self.document()
         if self.check:
             document = replace(document, parts=[*document.parts, self.check])
-        return document.written(form), True
+        return document.render(form), True
 
     def write(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
         if form == forms[0] and output is None and form not in self.data:
-            self.show(console())
+            self.show(make_console())
             return
         text, has_check = self.convert(form)
         write_output(text, output)
@@ -104,7 +105,7 @@ class Answer:
             say(self.check, err=True)
 
 
-def _npy(array: Any) -> bytes:
+def _npy_bytes(array: Any) -> bytes:
     import numpy as np
 
     stream = io.BytesIO()
@@ -113,19 +114,21 @@ def _npy(array: Any) -> bytes:
 
 
 _CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
-    "json": lambda data: json_text(data) + "\n", "csv": csv_text, "npy": _npy,
+    "json": lambda data: json_text(data) + "\n", "csv": csv_text, "npy": _npy_bytes,
 }  # fmt: skip
 
 
-def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
+def answer_command(
+    *names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None
+) -> Callable[[Any], Any]:
     """Make a command with --format and --output from a function that returns an `Answer`."""
-    forms = names or (*TEXTS, "json", "csv")
+    forms = names or (*TEXT_FORMATS, "json", "csv")
     formats = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
-    without_suffix = "csv" if "csv" in forms and "table" in forms else forms[0]
+    default_format = "csv" if "csv" in forms and "table" in forms else forms[0]
 
     def decorate(function: Callable[..., Answer]) -> Any:
         def command(context: click.Context, /, format_: str, output: Path | None, **values: Any) -> None:
-            context.params["format_"] = form = format_from_suffix(context, output, formats, without_suffix)
+            context.params["format_"] = form = format_from_suffix(context, output, formats, default_format)
             check_writable(output)
             answer = function(**values)
             answer.write(form, forms, output)
@@ -160,7 +163,7 @@ def report_compilation() -> Iterator[None]:
         yield
 
 
-def console(*, err: bool = False) -> Console:
+def make_console(*, err: bool = False) -> Console:
     """Return a console; for a pipe, the environment variable COLUMNS sets the width."""
     from urdfkin.cli.terminal import Terminal
 
@@ -194,27 +197,27 @@ def check_writable(*paths: Path | None) -> None:
             raise SourceError("cannot be written", where=str(path), found=found) from error
 
 
-def counted(n: int, noun: str) -> str:
+def format_count(n: int, noun: str) -> str:
     return f"{n} {noun}{'s' * (n != 1)}"
 
 
-def check_line(certificate: Certificate) -> str:
+def format_check_line(certificate: Certificate) -> str:
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
     parts = [
-        f"{counted(line.checked, f'{line.quantity} result')}, worst disagreement {line.worst:.2g} eps*scale"
-        f" ({line.share:.1%} of the bound)"
+        f"{format_count(line.checked, f'{line.quantity} result')}, worst disagreement"
+        f" {line.worst:.2g} eps*scale ({line.share:.1%} of the bound)"
         for line in certificate.lines
     ]
     return f"verified by {by}: {'; '.join(parts)}"
 
 
-def exit_code(certificate: Certificate) -> int:
+def certificate_exit_code(certificate: Certificate) -> int:
     return 0 if certificate.verified else 3
 
 
-def check_of_path(check: object | None) -> tuple[str, int]:
+def format_path_check(check: object | None) -> tuple[str, int]:
     """Return the last line of the output and the exit code; `check` is None if nothing was checked."""
     from urdfkin.verify.pinocchio import version
 

@@ -14,10 +14,10 @@ import click
 from urdfkin.cli.options import (
     FiniteNumber,
     convention_of_input_option,
-    conversion_of,
     digits_option,
+    find_conversion,
     load_robot,
-    locked_joints,
+    lock_settings,
     locked_line,
     path_options,
     q_option,
@@ -27,9 +27,9 @@ from urdfkin.cli.options import (
     seed_option,
     verify_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, check_of_path, writes_answer
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, format_path_check
 from urdfkin.errors import InputError
-from urdfkin.errors.display import Table, TextDocument, six_digits
+from urdfkin.errors.display import Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 @convention_of_input_option
 @seed_option
 @verify_option
-@writes_answer()
+@answer_command()
 def chain_command(
     robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
 ) -> Answer:
@@ -63,7 +63,7 @@ def chain_command(
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
-    inputs = read_inputs(loaded, path.tip, seed, q, conversion=conversion_of(loaded, convention))
+    inputs = read_inputs(loaded, path.tip, seed, q, conversion=find_conversion(loaded, convention))
     if len(inputs.q) != 1:
         raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(inputs.q)))
     path_q = path.coupling.select(loaded.tree, inputs.q)[0]
@@ -80,7 +80,7 @@ def chain_command(
         return _with_locked_joints(TextDocument(title, [Table(heads, rows, left=5, names=(0,))]), loaded)
 
     def data() -> dict[str, Any]:
-        converted = inputs.converted()
+        converted = inputs.convert_inputs()
         return {
             "robot": loaded.name,
             "source": loaded.source,
@@ -112,7 +112,7 @@ def chain_command(
             yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
 
     check = check_chain(loaded.verifier, path, inputs.q) if verify else None
-    return Answer(document, {"json": data, "csv": rows}, *check_of_path(check))
+    return Answer(document, {"json": data, "csv": rows}, *format_path_check(check))
 
 
 def _kind_of_joint(joint: Any) -> str:
@@ -121,7 +121,7 @@ def _kind_of_joint(joint: Any) -> str:
 
 
 def _vector(numbers: FloatArray) -> str:
-    return " ".join(six_digits(x) for x in numbers.tolist())
+    return " ".join(format_number(x) for x in numbers.tolist())
 
 
 SCREW_FORMATS = ("terminal", "markdown", "html", "latex", "toml", "json", "numpy", "matlab")
@@ -136,7 +136,7 @@ _SUFFIXES = {
 @path_options
 @digits_option
 @verify_option
-@writes_answer(*SCREW_FORMATS, suffixes=_SUFFIXES)
+@answer_command(*SCREW_FORMATS, suffixes=_SUFFIXES)
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
@@ -157,10 +157,10 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     check = check_screws(loaded.verifier, screws) if verify else None
     exact = (form for form in SCREW_FORMATS if form not in ("terminal", "markdown", "html"))
     data: dict[str, Callable[[], str]] = {form: partial(write_screws, screws, form, digits) for form in exact}
-    mapping = {**screws.as_mapping(), **locked_joints(loaded)}
+    mapping = {**screws.as_mapping(), **lock_settings(loaded)}
     data["json"] = lambda: json.dumps(mapping, indent=2) + "\n"
     return Answer(
-        lambda: _with_locked_joints(screws_document(screws, digits), loaded), data, *check_of_path(check)
+        lambda: _with_locked_joints(screws_document(screws, digits), loaded), data, *format_path_check(check)
     )
 
 
@@ -175,7 +175,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     " error of the tip pose exceeds MM millimetres or MM milliradians.",
 )
 @verify_option
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
@@ -187,8 +187,8 @@ def structure_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.structure import opw_of, structure
-    from urdfkin.system.documents import plain
+    from urdfkin.dh.structure import find_opw, find_structure
+    from urdfkin.system.documents import as_json_data
     from urdfkin.verify.conversions import check_opw, check_screws
 
     if opw is not None:
@@ -197,16 +197,16 @@ def structure_command(
     if opw is None:
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
-        found = structure(screws)
-        data = {"json": lambda: plain(found) | locked_joints(loaded)}
+        found = find_structure(screws)
+        data = {"json": lambda: as_json_data(found) | lock_settings(loaded)}
         return Answer(
-            lambda: _with_locked_joints(_structure_document(found), loaded), data, *check_of_path(check)
+            lambda: _with_locked_joints(_structure_document(found), loaded), data, *format_path_check(check)
         )
     path = loaded.chain(tip, base)
-    parameters = opw_of(path, opw / 1e3)
+    parameters = find_opw(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
     yaml = "".join(f"{key}: {json.dumps(value)}\n" for key, value in parameters.as_mapping().items())
-    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
+    return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *format_path_check(check))
 
 
 def _with_locked_joints(document: TextDocument, robot: Robot) -> TextDocument:
@@ -225,15 +225,16 @@ def _structure_document(found: Structure) -> TextDocument:
     if found.pairs:
         rows = []
         for pair in found.pairs:
-            angle = six_digits(math.degrees(pair.angle), 1e-9)
-            distance = six_digits(pair.distance * 1e3, 1e-9)
+            angle = format_number(math.degrees(pair.angle), 1e-9)
+            distance = format_number(pair.distance * 1e3, 1e-9)
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    point = ", ".join(six_digits(x, 1e-12) for x in found.reach_from)
+    point = ", ".join(format_number(x, 1e-12) for x in found.reach_from)
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{bound}, measured from ({point}) m, {found.reach_point}",
+        f"reach: {found.sampled_reach:.4g} m on samples{bound}, measured from ({point}) m,"
+        f" {found.reach_point}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]
@@ -245,4 +246,4 @@ def _kind_line(kind: StructureKind) -> str:
     line = f"{kind.name}: {', '.join(kind.joints)}, {'exactly' if kind.is_exact else deviation}"
     if kind.at is None:
         return line
-    return f"{line}, centre ({', '.join(six_digits(x, 1e-12) for x in kind.at)}) m at zero"
+    return f"{line}, centre ({', '.join(format_number(x, 1e-12) for x in kind.at)}) m at zero"

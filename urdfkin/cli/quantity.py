@@ -22,11 +22,11 @@ from urdfkin.cli.options import (
     base_options,
     combine,
     convention_option,
-    conversion_of,
+    find_conversion,
     frame_name_option,
     frame_option,
     load_robot,
-    locked_joints,
+    lock_settings,
     oracle_option,
     q_option,
     read_inputs,
@@ -41,8 +41,15 @@ from urdfkin.cli.options import (
     warn_of_motion,
     with_base,
 )
-from urdfkin.cli.output import TEXTS, Answer, check_line, exit_code, report_compilation, writes_answer
-from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
+from urdfkin.cli.output import (
+    TEXT_FORMATS,
+    Answer,
+    answer_command,
+    certificate_exit_code,
+    format_check_line,
+    report_compilation,
+)
+from urdfkin.errors.display import NOISE_FRACTION, Table, TextDocument, format_number
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
     ACCELERATION_BREAKDOWN,
@@ -67,15 +74,15 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from this file instead of --q, --v and --a. CSV output has one row for each time."
 )
-_MOST_SAMPLES = 5
+_MAX_SAMPLES = 5
 
 
-def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
+def quantity_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
     values = (_VALUE_OPTIONS[letter] for letter in inputs)
     return combine(
         *(robot_argument, frame_option, *own, convention_option, *values, _trajectory),
         *(base_options(inputs), seed_option, verify_option, oracle_option(), *last),
-        writes_answer(*TEXTS, "json", "csv", "npy"),
+        answer_command(*TEXT_FORMATS, "json", "csv", "npy"),
     )
 
 
@@ -83,7 +90,7 @@ def _read_options() -> Inputs:
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
     robot = load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
-    conversion = conversion_of(robot, options["convention"])
+    conversion = find_conversion(robot, options["convention"])
     if options["trajectory"] is not None:
         inputs = _read_trajectory(robot, options["frame"], options["trajectory"], "".join(values), conversion)
     else:
@@ -96,19 +103,19 @@ def _read_trajectory(
 ) -> Inputs:
     import numpy as np
 
-    from urdfkin.robot.trajectory import read_samples, with_rates
+    from urdfkin.robot.trajectory import complete_rates, read_samples
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
     x = read_samples(robot, path, conversion)
     if x.base is not None:
         reject_unused_options(context, _BASE, "along a --trajectory with a moving base")
-    settings = locked_joints(robot)
+    settings = lock_settings(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
-        motion = with_rates(robot.tree, x)
+        motion = complete_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
-        settings["derivatives"] = motion.rates
+        settings["derivatives"] = motion.rates_source
         warn_of_motion(motion)
     warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
@@ -120,24 +127,27 @@ def _verified_answer(
     x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any
 ) -> Answer:
     certificate = x.robot.certificate()
-    check = check_line(certificate)
+    check = format_check_line(certificate)
     if x.conversion is not None:
         check += f", before the conversion to {x.conversion.convention.name}"
     return Answer(
-        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())), data, check, exit_code(certificate)
+        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())),
+        data,
+        check,
+        certificate_exit_code(certificate),
     )
 
 
-def _samples(
-    x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
+def _format_samples(
+    x: Inputs, max_samples: int, other_formats: str, of: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
     n = len(x.q)
-    for k in range(min(n, most)):
+    for k in range(min(n, max_samples)):
         if n > 1:
             yield f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
         yield from of(k)
-    if n > most:
-        yield f"... and {n - most} more samples: --format {others} writes all"
+    if n > max_samples:
+        yield f"... and {n - max_samples} more samples: --format {other_formats} writes all"
 
 
 _ROBOT = (
@@ -151,12 +161,12 @@ _breakdown = click.option(
 )
 
 
-def command_of(quantity: Quantity) -> click.Command:
+def make_command(quantity: Quantity) -> click.Command:
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
     own = [reference_option] if quantity.referred else []
 
-    @computing_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
+    @quantity_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
     def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
         if breakdown:
             reject_unused_options(click.get_current_context(), ("convention",), "with --breakdown")
@@ -181,7 +191,7 @@ def command_of(quantity: Quantity) -> click.Command:
 
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
-    x = x.converted()
+    x = x.convert_inputs()
     if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
         units = dict(reversed(list(quantity.units.items())))
         quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
@@ -193,7 +203,9 @@ def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | 
     return _verified_answer(
         x,
         f"{quantity.name} of {x.frame}{where}",
-        lambda: _samples(x, _MOST_SAMPLES, "csv, json or npy", lambda k: [_table(x, quantity, result[k])]),
+        lambda: _format_samples(
+            x, _MAX_SAMPLES, "csv, json or npy", lambda k: [_table(x, quantity, result[k])]
+        ),
         json=lambda: _data(x, quantity, reference, result),
         csv=lambda: _rows(x, quantity, result),
         npy=lambda: result,
@@ -203,10 +215,10 @@ def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | 
 def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArray) -> dict[str, Any]:
     about = {"quantity": quantity.name, "frame": x.frame, "reference": reference}
     rows = list(quantity.labels) or None
-    return _head(x, quantity.inputs, **about, rows=rows) | {"result": result.tolist()}
+    return _metadata(x, quantity.inputs, **about, rows=rows) | {"result": result.tolist()}
 
 
-def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
+def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
     times = {} if x.t is None else {"t": x.t.tolist()}
     return {
         "robot": x.robot.name,
@@ -276,7 +288,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
-    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE * np.abs(value).max(initial=0.0)
+    seen = np.abs(value).max(axis=0, initial=0.0) > NOISE_FRACTION * np.abs(value).max(initial=0.0)
     pairs = zip(*np.nonzero(seen), strict=True)
     rows = [(rates[i], rates[j], *value[:, i, j].tolist()) for i, j in pairs]
     return Table(("column", "changed by", *quantity.labels), rows, left=2, names=(0, 1))
@@ -286,15 +298,15 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    from urdfkin.compiled.breakdown import KINDS
+    from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 
     heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
 
     def table(k: int) -> Iterator[Table]:
-        noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
+        noise = NOISE_FRACTION * float(abs(found.terms[k]).max(initial=0.0))
         rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
         # With four digits, a row fits on a terminal.
-        cells = [(*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
+        cells = [(*names, *(format_number(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
         yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
@@ -302,7 +314,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
             "The numbers are in m/s^2 and rad/s^2. The kinds are terms of equation 7.125: transverse"
             " (a z x d), centripetal, Coriolis (2 w x u) and sliding (a z)."
         )
-        yield from _samples(x, 2, "csv, json or npy", table)
+        yield from _format_samples(x, 2, "csv, json or npy", table)
 
     def rows() -> Iterator[list[object]]:
         yield [_TIME[x.t is not None], "joint", "kind", *SIX]
@@ -313,8 +325,8 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def data() -> dict[str, Any]:
         about = {"quantity": "acceleration breakdown", "frame": x.frame, "reference": reference}
-        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(KINDS)}
-        return _head(x, "qva", **about, **axes) | {
+        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(ACCELERATION_KINDS)}
+        return _metadata(x, "qva", **about, **axes) | {
             name: getattr(found, name).tolist() for name in ("base", "terms", "total")
         }
 
@@ -342,19 +354,19 @@ _FORMS = {
 
 
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
-@computing_options(
+@quantity_options(
     PLACEMENT.inputs,
     frame_name_option("--relative-to", "Link or joint in whose frame the pose is expressed.", "the world"),
     click.option(
         "--as",
-        "written",
+        "form",
         type=click.Choice(["matrix", *_FORMS]),
         default="matrix",
         help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
-def placement_command(relative_to: str | None, written: str, verify: bool, **_: Any) -> Answer:
+def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any) -> Answer:
     """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
 
     The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position and three
@@ -373,36 +385,36 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
         else:
             T = x.robot.relative_placement(x.q, x.frame, relative_to)
             x = x.with_settings(relative_to=relative_to)
-    if written == "matrix":
+    if form == "matrix":
         return _answer(x, PLACEMENT, T)
-    x = x.with_settings(written_as=written)
-    return _answer(x, _FORMS[written], _short_poses(x, T, written, verify=verify))
+    x = x.with_settings(written_as=form)
+    return _answer(x, _FORMS[form], _convert_poses(x, T, form, verify=verify))
 
 
-def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
+def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
     """Return each pose as six or seven numbers; with `verify`, Pinocchio checks the orientations."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
 
     R = T[:, :3, :3]
-    orientation = np.asarray(rpy_of(R) if written == "rpy" else quaternion_of(R))
+    orientation = np.asarray(rpy_of(R) if form == "rpy" else quaternion_of(R))
     if verify and x.robot.certificate().verified:
         from urdfkin.verify.conversions import check_orientations
 
-        check_orientations(orientation, R, x.frame, lambda k: _replay_command(x, k, written))
-    if written == "wxyz":
+        check_orientations(orientation, R, x.frame, lambda k: _replay_command(x, k, form))
+    if form == "wxyz":
         orientation = np.roll(orientation, 1, axis=-1)
     return np.hstack((T[:, :3, 3], orientation))
 
 
-def _replay_command(x: Inputs, k: int, written: str) -> str:
+def _replay_command(x: Inputs, k: int, form: str) -> str:
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     options = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
         if options[name] is not None:
             line += f" --{name.replace('_', '-')} {shlex.quote(options[name])}"
-    return f"{line} --as {written}"
+    return f"{line} --as {form}"
 
 
 #: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
@@ -413,7 +425,7 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
 @click.command(
     "analytical-jacobian", epilog="Example: urdfkin analytical-jacobian ur5 --q random --representation rpy"
 )
-@computing_options(
+@quantity_options(
     ANALYTICAL_JACOBIAN.inputs,
     click.option(
         "--representation",
@@ -447,14 +459,14 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
         J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
     if x.conversion is not None:
         J = x.conversion.columns(x.q, J)
-    row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *labels(representation)))
+    row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *orientation_labels(representation)))
     return _answer(x.with_settings(representation=representation), row, J)
 
 
-def labels(representation: str) -> tuple[str, ...]:
+def orientation_labels(representation: str) -> tuple[str, ...]:
     """Return the names of the numbers that represent an orientation.
 
-    >>> labels("xyz"), labels("ZYZ")
+    >>> orientation_labels("xyz"), orientation_labels("ZYZ")
     (('roll', 'pitch', 'yaw'), ('Z1', 'Y2', 'Z3'))
     """
     angles = ("roll", "pitch", "yaw")
@@ -465,7 +477,7 @@ def labels(representation: str) -> tuple[str, ...]:
 @click.command(
     "imu", epilog="Example: urdfkin imu panda --frame panda_hand --trajectory log.csv --format csv"
 )
-@computing_options(
+@quantity_options(
     IMU.inputs,
     click.option(
         "--gravity",
@@ -485,10 +497,10 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     or by arrays in the .npz file. With --root-joint floating, the pose of the root link is part of --q. See
     `urdfkin explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers
+    from urdfkin.robot.trajectory import parse_numbers
 
     x = _read_options()
-    g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
+    g = parse_numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
     with report_compilation():
         return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
 
@@ -510,7 +522,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
 @_trajectory
 @seed_option
 @verify_option
-@writes_answer()
+@answer_command()
 def singular_values_command(rows: str, **_: Any) -> Answer:
     """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
@@ -526,7 +538,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
-    from urdfkin.system.documents import plain
+    from urdfkin.system.documents import as_json_data
 
     x = _read_options()
     with report_compilation():
@@ -534,11 +546,11 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
         gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame, base=x.base))
     if x.conversion is not None:
         gradient = x.conversion.columns(x.q, gradient[:, None])[:, 0]
-    x = x.converted()
+    x = x.convert_inputs()
     names = [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
 
     def parts(k: int) -> Iterator[str | Table]:
-        lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _bounded(names, found, k)]
+        lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _iterate_bounds(names, found, k)]
         yield Table(("", "value", "lower bound", "upper bound"), lines)
         if singularity := found.singularity(k):
             # At a singularity, the manipulability may have no derivative.
@@ -548,11 +560,11 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
     def data() -> dict[str, Any]:
-        return _head(x, "q", quantity="singular values", frame=x.frame, rows=rows) | {
-            "singular_values": plain(found.values._asdict()),
-            "condition": plain(found.condition._asdict()),
-            "manipulability": plain(found.manipulability._asdict()),
-            "manipulability_gradient": plain(gradient),
+        return _metadata(x, "q", quantity="singular values", frame=x.frame, rows=rows) | {
+            "singular_values": as_json_data(found.values._asdict()),
+            "condition": as_json_data(found.condition._asdict()),
+            "manipulability": as_json_data(found.manipulability._asdict()),
+            "manipulability_gradient": as_json_data(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
                 if one
@@ -566,17 +578,17 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
         yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.velocity_names)]
         for k, (t, slopes) in enumerate(zip(_times(x), gradient.tolist(), strict=True)):
-            numbers = [n for _, sides in _bounded(names, found, k) for n in sides]
+            numbers = [n for _, sides in _iterate_bounds(names, found, k) for n in sides]
             yield [t, *map(repr, numbers), *map(repr, slopes)]
 
     settings = "".join(f", {name} {word}" for name, word in x.settings.items() if isinstance(word, str))
     title = f"singular values of {x.frame}, {rows} rows{settings}"
     return _verified_answer(
-        x, title, lambda: _samples(x, _MOST_SAMPLES, "csv or json", parts), json=data, csv=lines
+        x, title, lambda: _format_samples(x, _MAX_SAMPLES, "csv or json", parts), json=data, csv=lines
     )
 
 
-def _bounded(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
+def _iterate_bounds(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
     """Yield name and [value, lower bound, upper bound] of each quantity of sample `k`."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]

@@ -13,7 +13,7 @@ import click
 from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import report_crash, report_error
 from urdfkin.cli.options import FILE, NumberInRange, combine, markdown_option, schema_option
-from urdfkin.cli.output import TEXTS, Answer, check_writable, console, writes_answer
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, make_console
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
 from urdfkin.system.files import is_folder, write_file
@@ -132,7 +132,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     if not any(files.values()):
         from urdfkin.report.terminal import print_report
 
-        print_report(document, console(), cases=cases)
+        print_report(document, make_console(), cases=cases)
     context.exit(outcome_of(document).exit_code or failed)
 
 
@@ -150,7 +150,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     help="Report a regression if a quantity's largest disagreement grows by more than this factor.",
 )
 @markdown_option
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:
     """Compare two reports: versions, robots, verdicts and disagreements.
 
@@ -196,7 +196,7 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 @click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
 @schema_option("urdfkin.report.history:HISTORY", "the data")
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 

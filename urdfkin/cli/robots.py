@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import load_robot, robot_argument
-from urdfkin.cli.output import Answer, writes_answer
+from urdfkin.cli.output import Answer, answer_command
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_value
 from urdfkin.system.lazy_import import lazy_import
@@ -30,7 +30,7 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 @click.command("robots", epilog="Example: urdfkin robots --family arm")
 @click.option("--family", metavar="NAME", help=f"Show only the robots of one family: {', '.join(_FAMILIES)}.")
-@writes_answer()
+@answer_command()
 def robots_command(family: str | None) -> Answer:
     """List the robots of the catalogue, which every command loads by name.
 
@@ -73,7 +73,7 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 @click.command("info", epilog="Example: urdfkin info panda")
 @robot_argument
-@writes_answer()
+@answer_command()
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
@@ -83,11 +83,16 @@ def info_command(robot: str) -> Answer:
     lines before their names mark the children.
     """
     loaded = load_robot(robot)
-    data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
-    return Answer(loaded._sheet, data, fitted=lambda out: _fitted(out, loaded._sheet()))
+    data = {
+        "json": lambda: _describe(loaded),
+        "csv": lambda: _rows(loaded._text_document(), loaded.tree.links),
+    }
+    return Answer(
+        loaded._text_document, data, fit_document=lambda out: _fit_to_terminal(out, loaded._text_document())
+    )
 
 
-def _fitted(out: Console, document: TextDocument) -> TextDocument:
+def _fit_to_terminal(out: Console, document: TextDocument) -> TextDocument:
     """Merge the columns of links and joints if a table is wider than the terminal."""
     from urdfkin.report.listing import fits
 
@@ -119,7 +124,7 @@ _NO_ORDER = (
     "--from", "start", metavar="NAME|FILE", help="Convention to convert from.", show_default="urdfkin"
 )
 @click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to.", show_default="urdfkin")
-@writes_answer()
+@answer_command()
 def order_command(robot: str, start: str | None, end: str | None) -> Answer:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 

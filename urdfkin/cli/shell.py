@@ -127,12 +127,12 @@ def warm_command() -> None:
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """
-    from urdfkin.compiled.kernel_cache import cache_folder, listen_to_compile_events
+    from urdfkin.compiled.kernel_cache import kernel_cache_folder, listen_to_compile_events
     from urdfkin.compiled.machine import kernels
     from urdfkin.compiled.machine.single import one_configuration
     from urdfkin.verify.comparison import load_kernels
 
-    folder = cache_folder()
+    folder = kernel_cache_folder()
     if folder is None:
         raise SourceError(
             "no folder to store compiled kernels in",
@@ -146,7 +146,7 @@ def warm_command() -> None:
     with listen_to_compile_events(report):
         load_kernels()
         for kernel in (kernels.hessians, kernels.imus, one_configuration):
-            _ = kernel.compiled
+            _ = kernel.compiled_function
     stored = set(folder.glob("*.kernel"))
     if new := stored - before:
         say(f"{len(new)} of {len(stored)} kernels compiled in {time.perf_counter() - begin:.0f} s: {folder}")

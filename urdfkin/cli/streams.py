@@ -4,8 +4,8 @@ Standard output may be closed, a file on a full disk, or a pipe to a program tha
 encoding of standard output may not support every character of a joint's name. In each of these cases, the
 command ends without a traceback.
 
-`guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
+`wrap_streams` wraps standard output and standard error in a `SafeStream`, which escapes control characters
+and commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
 output. The function `say` and the class `Terminal` escape line feeds in names.
 """
 
@@ -23,23 +23,23 @@ from typing import Any, TextIO
 import click
 
 from urdfkin.errors import DegreesWarning, SourceError
-from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
+from urdfkin.errors.escape import CI_COMMAND_ANYWHERE, CI_COMMANDS, escape_sequence, escape_unprintable
 
 #: Exit code of shells for a program that writes to a closed pipe
-READER_GONE = 128 + signal.SIGPIPE
+BROKEN_PIPE_EXIT_CODE = 128 + signal.SIGPIPE
 
 
-def prepare() -> None:
+def prepare_streams() -> None:
     _open_closed_streams()
-    sys.stdout = _with_errors(sys.stdout, 1)
-    sys.stderr = _with_errors(sys.stderr, 2)
+    sys.stdout = _report_write_errors(sys.stdout, 1)
+    sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
     # Commands print their own line about joint values that look like degrees. Therefore, DegreesWarning is
     # hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
-def finish() -> None:
+def flush_output() -> None:
     """Flush standard output now, so that the caller can report a failed write."""
     sys.stdout.flush()
 
@@ -65,11 +65,11 @@ class _RawStream(io.FileIO):
 
 def _stop_command(error: OSError) -> BaseException:
     if error.errno == errno.EPIPE:
-        return SystemExit(READER_GONE)
+        return SystemExit(BROKEN_PIPE_EXIT_CODE)
     return SourceError("cannot be written", where="standard output", found=error.strerror or str(error))
 
 
-def _with_errors(stream: Any, descriptor: int) -> Any:
+def _report_write_errors(stream: Any, descriptor: int) -> Any:
     """Return a standard stream that reports write errors; return any other stream unchanged."""
     try:
         if stream.fileno() != descriptor:
@@ -116,7 +116,7 @@ def _show_warning(
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
 #: Maximum length of an unfinished line that is stored whole. The next piece of text may complete a CI command
 #: that begins in this line.
-_MOST_STORED = 64
+_MAX_STORED = 64
 
 
 class SafeStream:
@@ -136,26 +136,30 @@ class SafeStream:
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
         # Text and escape sequences alternate; only the text is escaped.
-        pieces[::2] = [self._without_commands(_plain(piece)) for piece in pieces[::2]]
+        pieces[::2] = [self._without_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        self._write_raw(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
+        self._write_raw(
+            CI_COMMAND_ANYWHERE.sub(
+                lambda found: found[0][:-1] + escape_sequence("["), _escape_unprintable(text)
+            )
+        )
 
     def write_file(self, text: str) -> None:
         self.stream.flush()
-        self.stream.buffer.write(self.escaped_file(text).encode())
+        self.stream.buffer.write(self.escape_file(text).encode())
         self.stream.buffer.flush()
 
-    def escaped_file(self, text: str) -> str:
+    def escape_file(self, text: str) -> str:
         """Return the text that `write_file` writes for `text`.
 
         A carriage return at the end of a line is not escaped.
         """
         *lines, last = text.split("\n")
-        plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
-        return self._without_commands("\n".join([*plain, _plain(last)]))
+        plain = [_escape_unprintable(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
+        return self._without_commands("\n".join([*plain, _escape_unprintable(last)]))
 
     def _write_raw(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
@@ -175,25 +179,29 @@ class SafeStream:
     def _line_without_commands(self, piece: str) -> str:
         before = len(self._line)
         whole = self._line + piece
-        at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
+        at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
         # Only the last 16 characters of a long line are stored; an "x" replaces the text before them.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
-        is_long = len(whole) > _MOST_STORED
+        is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
-        return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
+        return (
+            "".join(escape_sequence(c) if before + k in at else c for k, c in enumerate(piece))
+            if at
+            else piece
+        )
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
 
 
-def _plain(text: str) -> str:
+def _escape_unprintable(text: str) -> str:
     """Escape unprintable characters as in JSON, TOML and Python, except line feeds and tabs."""
     if text.isprintable():
         return text
-    return "".join(c if c in "\n\t" or c.isprintable() else escape(c) for c in text)
+    return "".join(c if c in "\n\t" or c.isprintable() else escape_sequence(c) for c in text)
 
 
-def guard() -> None:
+def wrap_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
@@ -203,13 +211,14 @@ def guard() -> None:
 
 def say(line: str, *, err: bool = False) -> None:
     """Print one line with escaped control characters."""
-    click.echo(printable(line), err=err)
+    click.echo(escape_unprintable(line), err=err)
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
     stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
-        click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
+        click.style(escape_unprintable(text), **style) if stream.styled else escape_unprintable(text)
+        for text, style in words
     )
     stream.write("".join(texts) + "\n")
 
@@ -218,11 +227,11 @@ def say_file(text: str) -> None:
     SafeStream(sys.stdout).write_file(text)
 
 
-def harmless(text: str) -> str:
+def escape_for_terminal(text: str) -> str:
     """Escape a text in the same way as `say_file`, but do not print the text."""
-    return SafeStream(sys.stdout).escaped_file(text)
+    return SafeStream(sys.stdout).escape_file(text)
 
 
-def command_lines(text: str) -> None:
+def print_commands(text: str) -> None:
     """Write lines that GitHub interprets as commands, for example findings as annotations."""
     SafeStream(sys.stdout).write_commands(text + "\n")

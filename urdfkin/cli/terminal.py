@@ -8,7 +8,7 @@ from typing import Any, TextIO, cast
 from rich.console import Console
 
 from urdfkin.cli.streams import SafeStream
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 
 _TRAILING = re.compile(r" +$", re.MULTILINE)
 
@@ -23,7 +23,7 @@ class Terminal(Console):
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print tables and texts; texts are not wrapped, so that users can copy them."""
-        texts = [printable(o) if isinstance(o, str) else o for o in objects]
+        texts = [escape_unprintable(o) if isinstance(o, str) else o for o in objects]
         only_text = all(isinstance(o, str) for o in objects)
         if self.is_terminal or only_text:
             super().print(*texts, **{"soft_wrap": only_text} | options)

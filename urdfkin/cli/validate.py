@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from urdfkin.cli.campaign import progress, warn
-from urdfkin.cli.exit import stoppable
+from urdfkin.cli.exit import handle_signals
 from urdfkin.cli.options import (
     WholeNumber,
     load_options,
@@ -22,12 +22,12 @@ from urdfkin.cli.options import (
     samples_option,
     seed_option,
 )
-from urdfkin.cli.output import check_writable, console, report_compilation
+from urdfkin.cli.output import check_writable, make_console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.quantities import compared, not_compared
 
@@ -242,7 +242,7 @@ def validate_command(
     given = [_load_stdin(robot, how) if with_study else robot for robot in robots or example_robots()]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
-        stoppable() as stop,
+        handle_signals() as stop,
         report_compilation(),
         _cluster(scheduler) as executor,
         progress(as_json=json_progress) as tell,
@@ -257,7 +257,7 @@ def validate_command(
         context.exit(stop.exit_code(report.exit_code))
     document = report.as_dict()
     written = write_reports(document, files)
-    print_report(document, console(), cases=cases)
+    print_report(document, make_console(), cases=cases)
     if not written:
         say_written(files)
     context.exit(stop.exit_code(report.exit_code) or written)
@@ -271,7 +271,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
     try:
         from urdfkin.validation.cluster import connect_cluster
     except ImportError:
-        raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
+        raise InputError("--scheduler needs dask.distributed", remedy=install_command("cluster")) from None
     with connect_cluster(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
 

@@ -23,7 +23,7 @@ from urdfkin.cli.options import (
     samples_option,
     seed_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
+from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, report_compilation
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.display import Strong, TextDocument
 from urdfkin.system.files import write_file
@@ -76,7 +76,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--junit", type=FILE, help="Also write JUnit XML to this file, with a test case for each function."
 )
 @oracle_option()
-@writes_answer(*TEXTS, "json")
+@answer_command(*TEXT_FORMATS, "json")
 def verify_command(
     target: str,
     robot: str,
@@ -133,7 +133,7 @@ def verify_command(
             verify_function(
                 function,
                 loaded,
-                (quantity or _quantity_of(name)).replace("-", " "),
+                (quantity or _require_quantity(name)).replace("-", " "),
                 frame=frame,
                 reference=reference,
                 convention=convention,
@@ -154,7 +154,7 @@ def verify_command(
 
 
 def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
-    documents = [check._sheet() for check in checks]
+    documents = [check._text_document() for check in checks]
     if len(documents) == 1:
         return documents[0]
     parts = [part for document in documents for part in (Strong(document.title), *document.parts, "")]
@@ -167,8 +167,8 @@ def _data(checks: Sequence[FunctionCheck]) -> dict[str, Any]:
     return {"agrees": all(check.agrees for check in checks), "checks": [check.as_dict() for check in checks]}
 
 
-def _quantity_of(function: str) -> str:
-    name = _quantity_in_name(function)
+def _require_quantity(function: str) -> str:
+    name = _find_quantity(function)
     if name is None:
         raise click.UsageError(
             f"the name of the function {function!r} contains no quantity; pass --quantity NAME, where"
@@ -177,7 +177,7 @@ def _quantity_of(function: str) -> str:
     return name
 
 
-def _quantity_in_name(function: str) -> str | None:
+def _find_quantity(function: str) -> str | None:
     """Return the quantity in a function's name: "jacobian-rate" for `jacobian_rate_of_tool0`."""
     names = sorted(_QUANTITIES, key=len, reverse=True)
     return next((name for name in names if name.replace("-", "_") in function), None)
@@ -198,7 +198,7 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
         if not callable(getattr(module, name, None)):
             raise UnknownNameError("function", name, functions)
         return {name: getattr(module, name)}
-    named = {key: value for key, value in functions.items() if _quantity_in_name(key)}
+    named = {key: value for key, value in functions.items() if _find_quantity(key)}
     if not named:
         raise InputError(
             "no function in the file is named after a quantity",

@@ -14,7 +14,7 @@ from urdfkin.cli.options import (
     FiniteNumber,
     WholeNumber,
     convention_of_input_option,
-    conversion_of,
+    find_conversion,
     frame_option,
     load_robot,
     q_option,
@@ -82,7 +82,7 @@ def view_command(
     from urdfkin.view.viewer import Viewer
 
     loaded = load_robot(robot)
-    conversion = conversion_of(loaded, convention)
+    conversion = find_conversion(loaded, convention)
     start = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
     if start is not None and len(start) != 1:
         raise InputError(
@@ -150,7 +150,7 @@ PANELS = (
     default=1.0,
     help="With --to: duration of the motion in seconds.",
 )
-@samples_option(201, "With --to: number of samples along the line.", least=3)
+@samples_option(201, "With --to: number of samples along the line.", minimum=3)
 @seed_option
 @click.option(
     "--panel",
@@ -209,19 +209,19 @@ def plot_command(
         motion = frame_motion(loaded, trajectory_, frame or loaded.tip_frame, reference)
     write_file(output, save(plot_motion(loaded, motion, trajectory_, panels), output))
     say(f"{loaded.name}: {motion.frame}: {caption(motion, trajectory_)}")
-    context.exit(3 if motion.not_verified is not None else 0 if motion.agrees else 1)
+    context.exit(3 if motion.unverified_reason is not None else 0 if motion.agrees else 1)
 
 
 def _line(
     robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
-    from urdfkin.robot.trajectory import line
+    from urdfkin.robot.trajectory import make_line_trajectory
 
-    conversion = conversion_of(robot, convention)
+    conversion = find_conversion(robot, convention)
     first, last = (
         read_inputs(robot, None, seed, text, option=option, conversion=conversion).q
         for option, text in (("--from", start), ("--to", end))
     )
     if len(first) != 1 or len(last) != 1:
         raise InputError("--from and --to need one configuration each", found=f"{len(first)} and {len(last)}")
-    return line(robot, first[0], last[0], duration, samples)
+    return make_line_trajectory(robot, first[0], last[0], duration, samples)

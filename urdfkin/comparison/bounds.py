@@ -40,20 +40,20 @@ from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
-SAMPLES = 512
+RANDOM_SAMPLES = 512
 #: Number of sampled configurations in which each variable is at an end of its range.
-CORNERS = 128
+CORNER_SAMPLES = 128
 #: Number of sampled configurations from which the search for one frame starts.
-STARTS = 4
+STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
-TRIED_VALUES = 13
+VALUES_PER_STEP = 13
 #: Number of frames that are searched in one batch.
-SEARCHED_TOGETHER = 24
+FRAMES_PER_BATCH = 24
 #: Width of the search interval in each round, as a fraction of the coordinate's range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
-Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
+PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
 class DistanceSearch:
@@ -97,15 +97,19 @@ class DistanceSearch:
             low + 2.0 * widest if math.isinf(high) else high
         )
 
-    def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
+    def configurations(
+        self, z: FloatArray, *, random_free_joints: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
         """Return configurations (n, nq) of A and B for values `z` (n, variables).
 
-        If `moved` is true, the configuration of A's planar and floating joints is random. Otherwise, it is
-        the neutral configuration.
+        If `random_free_joints` is true, the configuration of A's planar and floating joints is random.
+        Otherwise, it is the neutral configuration.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
-        q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
+        q_a = (
+            sample(tree_a, len(z), self.rng) if random_free_joints else np.tile(neutral(tree_a), (len(z), 1))
+        )
         q_b = np.tile(neutral(tree_b), (len(z), 1))
         for step in self.alignment.steps:
             joint = tree_a.joints[step.a]
@@ -142,27 +146,27 @@ class DistanceSearch:
         return self.poses_at(*self.configurations(z), frames, own_poses)
 
     def poses_at(
-        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
+        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, frames, 4, 4) of A and of B in A's root frame at configurations."""
         a, b = self.robots
-        Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
+        Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.alignment.base[1]]
-        Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
+        Ts_b = compute_poses(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
         if self.unbounded:
             return Ts_a, self.alignment.X @ Ts_b[:, 1:] @ tools
         T_root_base = self.T_root_base
         if not self.base_fixed[0]:
             link = self.alignment.base[0]
-            moved = computed(a, q_a, [a.tree.link_frames[link]])
+            moved = compute_poses(a, q_a, [a.tree.link_frames[link]])
             T_root_base = moved @ inverse(self.alignment.a.zero_poses[link]) @ T_root_base
         return Ts_a, T_root_base @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
     def distances_at(
-        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
+        self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> FloatArray:
-        a, b = self.poses_at(q_a, q_b, frames, computed)
+        a, b = self.poses_at(q_a, q_b, frames, compute_poses)
         return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
     def random_values(self, n: int) -> FloatArray:
@@ -173,24 +177,24 @@ class DistanceSearch:
         """Return the distances (n, frames), m, at values `z` (n, variables)."""
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
-    def sampled_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+    def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return distances (n, frames), m, at sampled values, and the values (n, variables)."""
         low, high = self.ends.T
-        z = self.random_values(SAMPLES)
-        corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
+        z = self.random_values(RANDOM_SAMPLES)
+        corners = np.where(self.rng.random((CORNER_SAMPLES, len(self.names))) < 0.5, low, high)
         z = np.concatenate((np.clip(np.zeros((1, len(self.names))), low, high), corners, z))
         return self.distances(z, frames), z
 
     def largest_distances(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
         largest: list[tuple[float, FloatArray]] = []
-        for first in range(0, len(frames), SEARCHED_TOGETHER):
-            batch = frames[first : first + SEARCHED_TOGETHER]
-            distances, z = self.sampled_distances(batch)
-            largest += self._maximize(batch, z[np.argsort(-distances, axis=0)[:STARTS].T])
+        for first in range(0, len(frames), FRAMES_PER_BATCH):
+            batch = frames[first : first + FRAMES_PER_BATCH]
+            distances, z = self.sample_distances(batch)
+            largest += self._maximize(batch, z[np.argsort(-distances, axis=0)[:STARTING_POINTS].T])
         return largest
 
     def largest_rotation(self, frame: FramePair) -> FloatArray:
-        z = self.sampled_distances([frame])[1]
+        z = self.sample_distances([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
         turned = [pose_difference(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
         return np.asarray(z[int(np.argmax(turned))])
@@ -204,7 +208,7 @@ class DistanceSearch:
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
         best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
-        steps = np.linspace(-0.5, 0.5, TRIED_VALUES)
+        steps = np.linspace(-0.5, 0.5, VALUES_PER_STEP)
         for window in WINDOWS:
             for turn in range(max(map(len, variables))):
                 i = np.array([own[turn % len(own)] if own else 0 for own in variables])
@@ -216,8 +220,8 @@ class DistanceSearch:
                 values = np.clip(
                     values, low[i][:, np.newaxis, np.newaxis], high[i][:, np.newaxis, np.newaxis]
                 )
-                tried = np.repeat(z[:, :, np.newaxis], TRIED_VALUES, axis=2)
-                place = k[..., np.newaxis], s[..., np.newaxis], np.arange(TRIED_VALUES)
+                tried = np.repeat(z[:, :, np.newaxis], VALUES_PER_STEP, axis=2)
+                place = k[..., np.newaxis], s[..., np.newaxis], np.arange(VALUES_PER_STEP)
                 tried[*place, i[:, np.newaxis, np.newaxis]] = values
                 distances = self._own_distances(tried, frames)
                 at = distances.argmax(axis=2)
@@ -268,12 +272,12 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 
 
 #: Maximum number of boxes in memory. The search for the bound of one frame then takes one or two seconds.
-MOST_BOXES = 2**17
+MAX_BOXES = 2**17
 #: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
-BATCH = 2**16
+BOXES_PER_BATCH = 2**16
 
 
-class Boxes:
+class BoxBounds:
     """Upper bounds on the distance between a frame's origins in A and B, for boxes of configurations.
 
     `names` must contain every variable that changes the distance.
@@ -307,13 +311,13 @@ class Boxes:
 
         `c` (n, variables) contains the centers of the boxes, and `h` (variables,) their half widths.
         """
-        D, G = self.at_middles(c)
+        D, G = self.evaluate_at_centers(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, MIN_DIVISOR)[:, np.newaxis]
         across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
-    def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the position differences (n, 3) and their derivatives (n, 3, variables) at `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
@@ -336,7 +340,7 @@ class Boxes:
 
 
 def tighten(
-    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST_BOXES
+    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MAX_BOXES
 ) -> float:
     """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
@@ -358,7 +362,7 @@ def tighten(
     if not target < upper < math.inf or not is_possible:
         return upper
     names, M = curvature(steps, some, variables, frame)
-    boxes = Boxes(search, frame, names)
+    boxes = BoxBounds(search, frame, names)
     ends = search.ends[boxes.at]
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
@@ -372,7 +376,7 @@ def tighten(
         c[::2, i] -= h[i]
         c[1::2, i] += h[i]
         if (second_order := 0.5 * float(h @ M @ h)) < upper:
-            bounds = [boxes.bounds(c[k : k + BATCH], h) for k in range(0, len(c), BATCH)]
+            bounds = [boxes.bounds(c[k : k + BOXES_PER_BATCH], h) for k in range(0, len(c), BOXES_PER_BATCH)]
             proven = np.minimum(proven, np.concatenate(bounds) + second_order)
             keep = proven > target
             c, proven = c[keep], proven[keep]

@@ -10,7 +10,7 @@ import numpy as np
 
 from urdfkin.comparison.bounds import DistanceSearch, own_poses, pinocchio_poses, tighten
 from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
-from urdfkin.comparison.verdict import CONFIRMED, Comparator
+from urdfkin.comparison.verdict import CONFIRMATION_SAMPLES, Comparator
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.mechanisms.matcher import align
@@ -27,14 +27,14 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import COARSE_GRID, FINE_GRID, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
-from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, as_json_data, doc, of_length
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
-MOST_AGAIN = 2**22
+MAX_RECHECK_BOXES = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
 #: The machine that wrote the certificate may have other rounding errors.
-_RELATIVE, _ZERO = 1e-9, 1e-15
+_RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound, in units of the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
@@ -44,16 +44,16 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 class CertifiedModel(TypedDict):
     """Name and source of one of the two compared models."""
 
-    name: Annotated[str, says("Name of the robot.")]
-    source: Annotated[str, says("Path, catalogue name, - for standard input, or <text>.")]
+    name: Annotated[str, doc("Name of the robot.")]
+    source: Annotated[str, doc("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
-    leader: Annotated[str, says("Name of the mimicked joint.")]
-    multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
+    leader: Annotated[str, doc("Name of the mimicked joint.")]
+    multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
+    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
 
 
 Value = str | float | list[str | float | None] | CertifiedRule | None
@@ -62,50 +62,50 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 class DifferenceEntry(TypedDict):
     """A difference between the two models at one joint or link."""
 
-    place: Annotated[str, says("Name of the joint or link of A that differs.")]
+    place: Annotated[str, doc("Name of the joint or link of A that differs.")]
     what: Annotated[
-        str, says("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
+        str, doc("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
     ]
-    a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
-    b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
-    radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
-    metres: Annotated[Size, says("Linear part of the difference, metres; 0 if there is none.")]
+    a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
+    b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
+    radians: Annotated[Size, doc("Angular part of the difference, radians; 0 if there is none.")]
+    metres: Annotated[Size, doc("Linear part of the difference, metres; 0 if there is none.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        says("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
+        doc("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
     ]
 
 
 class CertifiedConversion(TypedDict):
     """The pose of a planar or floating joint in B is before * (pose in A) * behind."""
 
-    before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
-    behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
+    before: Annotated[Matrix, doc("Matrix M (4, 4), multiplied from the left.")]
+    behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
-        says("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
+        doc("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
     ]
 
 
 class CertifiedJoint(TypedDict):
     """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
 
-    a: Annotated[str, says("Name of the joint in A.")]
-    b: Annotated[str, says("Name of the joint in B.")]
-    sense: Annotated[Literal[1, -1], says("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
-    offset: Annotated[float, says("Constant `offset`, rad or m.")]
+    a: Annotated[str, doc("Name of the joint in A.")]
+    b: Annotated[str, doc("Name of the joint in B.")]
+    sense: Annotated[Literal[1, -1], doc("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
+    offset: Annotated[float, doc("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        says("Conversion of a planar or floating joint's pose; null if not needed."),
+        doc("Conversion of a planar or floating joint's pose; null if not needed."),
     ]
 
 
 class ToolEntry(TypedDict):
     """Two matched links with different poses on their rigid body; `same` reports them as different tools."""
 
-    a: Annotated[str, says("Link of A.")]
-    b: Annotated[str, says("Link of B.")]
-    pose: Annotated[Matrix, says("Pose of the link of B in the frame of the link of A.")]
+    a: Annotated[str, doc("Link of A.")]
+    b: Annotated[str, doc("Link of B.")]
+    pose: Annotated[Matrix, doc("Pose of the link of B in the frame of the link of A.")]
 
 
 class Rounding(TypedDict):
@@ -121,42 +121,42 @@ class Rounding(TypedDict):
 class FrameEntry(TypedDict):
     """An interval that contains the largest distance between a frame of A and the matching frame of B."""
 
-    frame: Annotated[str, says("Link of A.")]
-    frame_b: Annotated[str, says("Link of B.")]
+    frame: Annotated[str, doc("Link of A.")]
+    frame_b: Annotated[str, doc("Link of B.")]
     lower: Annotated[
         Size,
-        says(
+        doc(
             "Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding"
             " error."
         ),
     ]
     upper: Annotated[
         Size | None,
-        says(
+        doc(
             "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
             " proven."
         ),
     ]
     radians: Annotated[
         Size | None,
-        says(
+        doc(
             "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
             " proven."
         ),
     ]
-    radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
-    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
-    q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
+    radians_seen: Annotated[Size, doc("Angle between the orientations at `q_a` and `q_b`, radians.")]
+    q_a: Annotated[list[float], doc("Configuration of A; empty if the frame does not differ.")]
+    q_b: Annotated[list[float], doc("Configuration of B that corresponds to `q_a`.")]
 
 
 class Confirmed(TypedDict):
     """Pinocchio's confirmation of the bounds."""
 
-    state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
-    by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[Count, says("Number of configurations at which the oracle checked the bounds.")]
-    metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
-    reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
+    state: Annotated[ConfirmationState, doc("Whether the oracle confirmed the bounds.")]
+    by: Annotated[str, doc("Name and version of the oracle; empty without a confirmation.")]
+    configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
+    metres: Annotated[Size, doc("Largest distance that the oracle computed, metres.")]
+    reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
 class SameCertificate(Header):
@@ -166,34 +166,34 @@ class SameCertificate(Header):
     b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes that bring B closest to A."),
+        doc("Kinds of changes that bring B closest to A."),
     ]
-    differences: Annotated[list[DifferenceEntry], says("Differences, in order from the base to the tips.")]
+    differences: Annotated[list[DifferenceEntry], doc("Differences, in order from the base to the tips.")]
     remarks: Annotated[
         list[DifferenceEntry],
-        says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
+        doc("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
-    joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
+    joints: Annotated[list[CertifiedJoint], doc("Matched pairs of a joint of A and a joint of B.")]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
     tools: Annotated[
         list[ToolEntry],
-        says("Matched links whose poses differ; each counts as a different tool."),
+        doc("Matched links whose poses differ; each counts as a different tool."),
     ]
     orders: Annotated[
-        list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")
+        list[list[str]], doc("Consecutive joints of B whose order was changed, in the new order.")
     ]
-    base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
+    base: Annotated[Matrix, doc("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), says("Poses are compared relative to these links of A and B.")
+        list[str], of_length(2), doc("Poses are compared relative to these links of A and B.")
     ]
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        says("Interval of the largest distance for each pair of matched links, after B is changed."),
+        doc("Interval of the largest distance for each pair of matched links, after B is changed."),
     ]
     as_written: Annotated[
         FrameEntry | None,
-        says("Interval for the frame with the largest distance before B is changed; null without changes."),
+        doc("Interval for the frame with the largest distance before B is changed; null without changes."),
     ]
     checked: Confirmed
 
@@ -217,19 +217,20 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
         "a": a,
         "b": b,
         **{name: getattr(result, name) for name in _COPIED},
+        "checked": result.confirmation,
         "rounding": dict(zip(("metres", "radians"), result.rounding, strict=True)),
     }
-    return cast("SameCertificate", plain(document))
+    return cast("SameCertificate", as_json_data(document))
 
 
 #: Attributes of `Sameness` that the certificate contains under the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
-    "as_written", "checked",
+    "as_written",
 )  # fmt: skip
 
 
-def words_of(entry: DifferenceEntry) -> str:
+def difference_text(entry: DifferenceEntry) -> str:
     a, b = (
         Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
         for x in (entry["a"], entry["b"])
@@ -266,7 +267,7 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
 
 
 def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
-    choices = _choices(document)
+    choices = _read_choices(document)
     if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
@@ -307,15 +308,15 @@ def _statement_errors(document: SameCertificate, comparator: Comparator, result:
     claimed = {(one["place"], one["what"]): one for one in document["differences"]}
     for key, one in expected.items():
         if key not in claimed:
-            yield f"`differences`: this difference is missing: {words_of(one)}"
+            yield f"`differences`: this difference is missing: {difference_text(one)}"
     for key, one in claimed.items():
         if key not in expected:
-            yield f"`differences`: this is not a difference: {words_of(one)}"
+            yield f"`differences`: this is not a difference: {difference_text(one)}"
     if len(claimed) < len(document["differences"]):
         yield "`differences`: an entry is listed twice"
     for key, one in claimed.items():
         if key in expected and not _same_difference(one, expected[key], result.rounding):
-            yield f"`differences`: the size or a value is wrong in: {words_of(one)}"
+            yield f"`differences`: the size or a value is wrong in: {difference_text(one)}"
     if not _equal(document["tools"], correct["tools"], max(result.rounding)):
         yield "`tools`: the entries differ from those computed from the models"
     if document["verdict"] != result.verdict.value:
@@ -332,8 +333,12 @@ def _same_difference(
 ) -> bool:
     return (
         all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
-        and math.isclose(claimed["metres"], expected["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
-        and math.isclose(claimed["radians"], expected["radians"], rel_tol=_RELATIVE, abs_tol=rounding[1])
+        and math.isclose(
+            claimed["metres"], expected["metres"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[0]
+        )
+        and math.isclose(
+            claimed["radians"], expected["radians"], rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding[1]
+        )
     )
 
 
@@ -341,22 +346,22 @@ def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, alignment: Alignment, variables: Variables
 ) -> Iterator[str]:
     state, reason = claimed["state"], claimed["reason"]
-    if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
+    if state != "confirmed" and reason and claimed == as_json_data(Confirmation(state, reason=reason)):
         return
     known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
-    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:
+    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMATION_SAMPLES or not known:
         yield (
-            f"`checked`: the entry must contain a confirmation at {CONFIRMED} configurations, or a reason"
-            " why there is none"
+            f"`checked`: the entry must contain a confirmation at {CONFIRMATION_SAMPLES} configurations,"
+            " or a reason why there is none"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
     rounding = comparator.rounding(alignment, variables)[0]
-    if not math.isclose(claimed["metres"], metres, rel_tol=_RELATIVE, abs_tol=rounding):
+    if not math.isclose(claimed["metres"], metres, rel_tol=_RELATIVE_TOLERANCE, abs_tol=rounding):
         yield f"`checked`: Pinocchio finds at most {metres:.2g} m, not {claimed['metres']:.2g} m"
 
 
-def _choices(document: SameCertificate) -> AlignmentChoices:
+def _read_choices(document: SameCertificate) -> AlignmentChoices:
     joints, base = document["joints"], document["base_links"]
     return AlignmentChoices(
         (base[0], base[1]),
@@ -394,7 +399,7 @@ def _choices_error(
     return None
 
 
-def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
+def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
     """Compare two entries; the last digits of numbers may differ."""
     if isinstance(expected, dict):
         return (
@@ -409,14 +414,14 @@ def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
             and all(_equal(*pair, zero) for pair in zip(claimed, expected, strict=True))
         )
     if isinstance(expected, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, expected, rel_tol=_RELATIVE, abs_tol=zero)
+        return math.isclose(claimed, expected, rel_tol=_RELATIVE_TOLERANCE, abs_tol=zero)
     return bool(claimed == expected)
 
 
 def _as_written_errors(
     claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    written = comparator.as_written(alignment)
+    written = comparator.align_as_written(alignment)
     if claim is None:
         if written.frames:
             yield "`as_written` is missing; it must contain the largest distance between the unchanged models"
@@ -429,7 +434,7 @@ def _as_written_errors(
         return
     search = comparator.search(written, variables, as_written=True)
     rounding = comparator.rounding(written, variables)
-    distances = search.sampled_distances(written.frames)[0].max(axis=0)
+    distances = search.sample_distances(written.frames)[0].max(axis=0)
     if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
         farthest = links[0][written.frames[int(distances.argmax())].a]
         yield f"`as_written`: frame {farthest} has a larger distance, {distances.max():.6g} m"
@@ -470,12 +475,12 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
+        attained = max(claim["lower"], float(search.sample_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
         if not search.unbounded:
-            proven = tighten(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+            proven = tighten(search, frame, metres, proven[0], MAX_RECHECK_BOXES), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
     yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"

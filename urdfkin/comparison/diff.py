@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
 from urdfkin.comparison.result import (
-    BOUNDED,
+    BOUNDED_DIFFERENCES,
     Difference,
     Interval,
     Sameness,
@@ -30,20 +30,20 @@ from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import as_robot, robot_of
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.robot.loading import as_robot, make_robot
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
-_PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
+_VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
 #: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
-_ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
+_ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
-_MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
+_MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Changes that move a link, for two versions of different formats.
-_MOVING_LINKS = ("origin", "place", "base", "carried by")
+_MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
 
@@ -65,27 +65,27 @@ class ModelChange:
     @property
     def moves(self) -> bool:
         if self.element.startswith("link "):
-            return self.what in _MOVING_LINKS
+            return self.what in _MOTION_LINK_ATTRIBUTES
         if self.element == "robot":
             return self.what == "as a whole"
-        return self.element.startswith("joint ") and self.what.split(" ")[0] in _MOVING
+        return self.element.startswith("joint ") and self.what.split(" ")[0] in _MOTION_ATTRIBUTES
 
     def __str__(self) -> str:
         if not self.what:
             return log_line(f"{self.element}: {'new' if self.old is None else 'gone'}")
         if self.size:
             return log_line(f"{self.element}: {self.what} {self.size}")
-        return log_line(f"{self.element}: {self.what} {word(self.old)} -> {word(self.new)}")
+        return log_line(f"{self.element}: {self.what} {format_value(self.old)} -> {format_value(self.new)}")
 
 
-def word(value: Value | None) -> str:
+def format_value(value: Value | None) -> str:
     """Return a value as text; a number has enough digits to be read back exactly."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
 
 
-def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
+def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -100,7 +100,7 @@ class Effect:
 
     @property
     def words(self) -> str:
-        return motion_words(self.interval, "moves", "turns")
+        return displacement_text(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
         return log_line(f"alone {self.words}")
@@ -158,7 +158,7 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
     """
     old, new = as_robot(a), as_robot(b)
     if _format(old) != _format(new):
-        return _across_formats(old, new, effects=effects)
+        return _diff_across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))
     moving = list(dict.fromkeys(change.element for change in changes if change.moves)) if effects else []
     found = [_effect(old.tree, new.tree, element, element.removeprefix("joint ")) for element in moving]
@@ -172,12 +172,12 @@ def _format(robot: Robot) -> str:
     return "MJCF" if robot.origin.sha256 else "URDF"
 
 
-def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
+def _diff_across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
     result = same(old, new, bounds=effects)
     changes = tuple(_changes_of(result, (_format(old), _format(new))))
     found = list[Effect | None]()
     if effects:
-        tree = _renamed(result)
+        tree = _rename_like_a(result)
         moving = [one.element for one in changes if one.moves and one.element != "robot"]
         for element in dict.fromkeys(moving):
             kind, _, name = element.partition(" ")
@@ -185,7 +185,7 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
                 name = old.tree.joints[link - 1].name
             found.append(_effect(old.tree, tree, element, name))
     total = result.worst_as_written if any(change.moves for change in changes) else None
-    rounding = result.written if result.up_to_single else None
+    rounding = result.bound_as_written if result.up_to_single else None
     return Changes((old.source, new.source), changes, tuple(filter(None, found)), total, rounding)
 
 
@@ -197,7 +197,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             yield ModelChange(at.place, at.what, at.a, at.b)
     yield from _differences_in_size(result)
     for one in result.differences:
-        if one.what not in BOUNDED or one.what == "fixed":
+        if one.what not in BOUNDED_DIFFERENCES or one.what == "fixed":
             yield from _change_of(one)
     for pair in result.joints:
         if pair.b not in spellings(pair.a) and pair.a not in spellings(pair.b):
@@ -227,7 +227,7 @@ def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
     for words in result.after:
         yield ModelChange("robot", "as a whole", None, None, words)
     for one in result.differences:
-        if one.what in BOUNDED - {"fixed"} and one.place not in listed:
+        if one.what in BOUNDED_DIFFERENCES - {"fixed"} and one.place not in listed:
             yield ModelChange(one.place, one.what, *one.values, size_words(one.metres, one.radians))
 
 
@@ -245,7 +245,7 @@ def _change_of(one: Difference) -> Iterator[ModelChange]:
         yield ModelChange(name, "", old, new)
 
 
-def _renamed(result: Sameness) -> KinematicTree:
+def _rename_like_a(result: Sameness) -> KinematicTree:
     """Return B's tree with A's names for all matched joints and links."""
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
@@ -265,7 +265,7 @@ def _renamed(result: Sameness) -> KinematicTree:
 
 
 def _changes(old: str, new: str) -> Iterator[ModelChange]:
-    roots = plain_xml(old), plain_xml(new)
+    roots = parse_xml(old), parse_xml(new)
     names = roots[0].get("name"), roots[1].get("name")
     if names[0] != names[1]:
         yield ModelChange("robot", "name", *names)
@@ -297,7 +297,7 @@ def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
 
 def _attributes(element: Element, path: str) -> Iterator[tuple[str, Value]]:
     for name, text in element.attrib.items():
-        if (parts := _PARTS.get(name)) and len(words := text.split()) == len(parts):
+        if (parts := _VECTOR_COMPONENTS.get(name)) and len(words := text.split()) == len(parts):
             for part, number in zip(parts, words, strict=True):
                 yield f"{path} {part}".strip(), _value(number)
         else:
@@ -328,13 +328,15 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
     joints = list(old.joints)
     joints[i] = replace(joint, parent=joints[i].parent)
     try:
-        changed, unchanged = (_quiet_robot(tree) for tree in (replace(old, joints=tuple(joints)), old))
+        changed, unchanged = (
+            _make_unverified_robot(tree) for tree in (replace(old, joints=tuple(joints)), old)
+        )
     except InputError:  # A URDF cannot describe the changed tree.
         return None
     worst = same(unchanged, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
 
 
-def _quiet_robot(tree: KinematicTree) -> Robot:
+def _make_unverified_robot(tree: KinematicTree) -> Robot:
     text = UrdfText(to_urdf(tree).encode(), tree.name, tree.name)
-    return robot_of(text, verify=False, made=True, quiet=True)
+    return make_robot(text, verify=False, is_generated=True, quiet=True)

@@ -16,10 +16,10 @@ from xml.parsers.expat import ExpatError
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.model.tree import FloatArray, Joint, JointKind
-from urdfkin.system.plain_xml import plain_xml
-from urdfkin.system.processes import ask_python, own_python
+from urdfkin.system.plain_xml import parse_xml
+from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.mjcf import is_mjcf, is_text
 from urdfkin.urdf.sources import is_usd
 from urdfkin.verify.adapters import LIBRARIES, version
@@ -33,11 +33,11 @@ _TOLERANCE = 1e-9
 #: Tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
 #: Time limit for the process of one library, in seconds.
-_PATIENCE = 60.0
+_TIMEOUT = 60.0
 #: Maximum number of bytes that a library's process may return.
-_MOST_BYTES = 400_000_000
+_MAX_BYTES = 400_000_000
 #: Maximum length of a library's error message, in characters.
-_MOST_CHARACTERS = 200
+_MAX_CHARACTERS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class LibraryReading:
         return asdict(self)
 
 
-def installed(form: str = "urdf") -> tuple[str, ...]:
+def installed_libraries(form: str = "urdf") -> tuple[str, ...]:
     return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
 
 
@@ -98,8 +98,8 @@ def compare_readers(
             also raised if a joint is locked, or if the robot was loaded from MJCF text instead of a file. It
             is also raised if a variant or an articulation of a USD file was selected.
     """
-    source, form = _source(robot)
-    names = installed(form) if libraries is None else tuple(libraries)
+    source, form = _library_input(robot)
+    names = installed_libraries(form) if libraries is None else tuple(libraries)
     if not names:
         could = [one.package for one in LIBRARIES.values() if form in one.forms]
         raise InputError(
@@ -119,10 +119,10 @@ def compare_readers(
         )
     q = np.concatenate((np.asarray(robot.neutral())[None], robot.sample(samples, seed=seed)))
     ours = np.asarray(robot.placement(q, list(robot.link_names)))
-    return tuple(_reading(robot, name, source, form, q, ours) for name in names)
+    return tuple(_compare_reader(robot, name, source, form, q, ours) for name in names)
 
 
-def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
+def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
     return {
         joint.name: q[i : i + joint.nq].tolist() if joint.nq > 1 else float(q[i])
         for joint, i in zip(robot.tree.joints, robot.tree.q_index, strict=True)
@@ -130,23 +130,23 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
     }
 
 
-def _reading(
+def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
     """Run a library in a separate process, and compare its poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
-    values = [values_of(robot, one) for one in q]
-    command = own_python("from urdfkin.verify.adapters import main; main()")
+    values = [joint_values(robot, one) for one in q]
+    command = python_command("from urdfkin.verify.adapters import main; main()")
     case = {"name": robot.name, "text": source, "configurations": values}
-    output, status = ask_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST_BYTES)
+    output, status = run_python([*command, name], json.dumps([case]).encode(), _TIMEOUT, _MAX_BYTES)
     if status != 0 or not output:
-        how = f"no answer in {_PATIENCE:g} s" if status is None else f"its process ended with {status}"
+        how = f"no answer in {_TIMEOUT:g} s" if status is None else f"its process ended with {status}"
         return LibraryReading(title, number, how)
     answer = json.loads(output)
     if "error" in answer:
-        return LibraryReading(title, number, printable(answer["error"])[:_MOST_CHARACTERS])
+        return LibraryReading(title, number, escape_unprintable(answer["error"])[:_MAX_CHARACTERS])
     links = robot.link_names
     tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].single else _TOLERANCE
     tolerance *= max(1.0, float(np.abs(ours).max()))
@@ -161,7 +161,7 @@ def _reading(
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())
     poses_of = dict(zip(shared, theirs.swapaxes(0, 1), strict=True))
-    elements = _elements(source) if form == "urdf" else {}
+    elements = _joint_elements(source) if form == "urdf" else {}
     own = [joint for joint in answer["joints"] if joint in values[0]]
     new = (joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements)
     added = next(new, None)
@@ -180,7 +180,7 @@ def _reading(
     )
 
 
-def _source(robot: Robot) -> tuple[str, str]:
+def _library_input(robot: Robot) -> tuple[str, str]:
     """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
     source = robot.origin.source
     if is_usd(source):
@@ -194,23 +194,23 @@ def _source(robot: Robot) -> tuple[str, str]:
         if is_text(source):
             raise InputError("other libraries read MJCF only from a file", remedy="write the text to a file")
         return str(source), "mjcf"
-    return _without_shapes(robot.urdf), "urdf"
+    return _remove_shapes(robot.urdf), "urdf"
 
 
-def _without_shapes(text: str) -> str:
+def _remove_shapes(text: str) -> str:
     """Return a URDF without shapes; some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
-    robot = plain_xml(text)
+    robot = parse_xml(text)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
             link.remove(shape)
     return tostring(robot, "unicode")
 
 
-def _elements(text: str) -> dict[str, Any]:
+def _joint_elements(text: str) -> dict[str, Any]:
     try:
-        return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
+        return {joint.get("name", ""): joint for joint in parse_xml(text).iterfind("joint")}
     except ExpatError:
         return {}
 
@@ -231,11 +231,11 @@ def _differences(
         T_theirs = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
         size = float(np.abs(T - T_theirs).max())
         if not size <= tolerance:
-            element, words = _cause(joint, T, T_theirs, elements.get(joint.name), own, tolerance)
+            element, words = _find_cause(joint, T, T_theirs, elements.get(joint.name), own, tolerance)
             yield ReaderDifference(joint.name, element, f"{title} {words}", size)
 
 
-def _cause(
+def _find_cause(
     joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
 ) -> tuple[str, str]:
     """Return the element that causes a difference, and a description of the difference.
@@ -254,12 +254,12 @@ def _cause(
     if difference[0].max() > tolerance:
         return "origin xyz", "has a different position at q = 0"
     if joint.name in own and joint.kind.has_axis:
-        return "axis", _motion(joint, T, T_theirs, tolerance)
+        return "axis", _describe_motion(joint, T, T_theirs, tolerance)
     words = "moves the joint differently" if joint.name in own else "has no coordinate for the joint"
     return f"type {joint.kind.value}", words
 
 
-def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float) -> str:
+def _describe_motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float) -> str:
     start = np.linalg.inv(T[0])
     ours, theirs = start @ T[1:], start @ T_theirs[1:]
     if joint.kind is JointKind.PRISMATIC:
@@ -271,7 +271,7 @@ def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float)
         return "turns the joint in the opposite direction"
     elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > tolerance:
         return "returns a matrix that is not a rotation"
-    direction, own = (_direction(joint, T[0]) for T in (theirs, ours))
+    direction, own = (_motion_direction(joint, T[0]) for T in (theirs, ours))
     if (length := math.hypot(*direction)) <= tolerance:
         return "does not move the joint"
     sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
@@ -279,7 +279,7 @@ def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float)
     return f"uses a different joint axis: {x} {y} {z}"
 
 
-def _direction(joint: Joint, T: FloatArray) -> FloatArray:
+def _motion_direction(joint: Joint, T: FloatArray) -> FloatArray:
     if joint.kind is JointKind.PRISMATIC:
         return T[:3, 3]
     return np.array([T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]])

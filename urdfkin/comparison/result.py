@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import nearest_twelfth
-from urdfkin.dh.units import units_of
+from urdfkin.dh.units import parse_units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
@@ -32,7 +32,7 @@ from urdfkin.model.mechanisms.mechanism import (
     tolerance_of,
 )
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
@@ -57,9 +57,9 @@ class Verdict(Enum):
 
 #: Kinds of changes of B after which `same` still calls the models equivalent.
 #: The printed verdict lists the kinds in this order.
-FREE = ("base", "zeros", "senses", "free joints", "tools")
+EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between matching frames has an upper bound.
-BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
+BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class Difference:
     def values(self) -> tuple[str | float | None, str | float | None]:
         """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
         if self.what == "limits":
-            return _range(self.a), _range(self.b)
+            return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
             return "fixed by its rule" if self.a else None, "fixed by its rule" if self.b else None
         a, b = (x if isinstance(x, str | float) else None for x in (self.a, self.b))
@@ -158,21 +158,21 @@ class Difference:
                 moves, fixed = ("A", "B") if b == "fixed" else ("B", "A")
                 return f"{place} moves in {moves} and is fixed in {fixed}"
             case "mimic rule" if a is None and b is not None:
-                return f"{place} is an independent joint in A and a mimic joint in B: {_rule(b)}"
+                return f"{place} is an independent joint in A and a mimic joint in B: {_format_rule(b)}"
             case "mimic rule" if a is not None and b is None:
-                return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
+                return f"{place} is a mimic joint in A and an independent joint in B: {_format_rule(a)}"
             case "mimic rule":
-                return f"{place} has different mimic rules: {_rule(a)} in A, {_rule(b)} in B"
+                return f"{place} has different mimic rules: {_format_rule(a)} in A, {_format_rule(b)} in B"
             case "independent joint":
-                return f"{place} is a mimic joint only in A, and moves alike in A and B: {_rule(a)}"
+                return f"{place} is a mimic joint only in A, and moves alike in A and B: {_format_rule(a)}"
             case "idle":
                 which, values = ("A", a) if isinstance(a, tuple) else ("B", b)
                 return f"{place} never moves in {which}: {_idle_words(values)}"
             case "limits":
                 converted = " (in A's coordinate)" if self.detail else ""
-                return f"{place}: limits {_range(a)} in A, {_range(b)} in B{converted}"
+                return f"{place}: limits {_format_range(a)} in A, {_format_range(b)} in B{converted}"
             case "velocity" | "effort":
-                return f"{place}: {what} limit {_number(a):g} in A, {_number(b):g} in B"
+                return f"{place}: {what} limit {_as_number(a):g} in A, {_as_number(b):g} in B"
             case "carried by":
                 return f"{place} is carried by {a} in A, by {b} in B"
             case "kind":
@@ -185,23 +185,24 @@ class Difference:
         )
 
 
-def _rule(rule: Value) -> str:
+def _format_rule(rule: Value) -> str:
     return f"{rule.multiplier!r} {rule.leader} {rule.offset:+.17g}" if isinstance(rule, Mimic) else "free"
 
 
 def _idle_words(values: Value) -> str:
     kind, value = values if isinstance(values, tuple) else (None, None)
     unit = "m" if kind == JointKind.PRISMATIC.value else "rad"
-    return f"its mimic rule has the multiplier 0, so the joint's value is always {_number(value):.12g} {unit}"
+    number = f"{_as_number(value):.12g} {unit}"
+    return f"its mimic rule has the multiplier 0, so the joint's value is always {number}"
 
 
-def _number(x: object, infinity: float = math.inf) -> float:
+def _as_number(x: object, infinity: float = math.inf) -> float:
     return x if isinstance(x, float) else infinity
 
 
-def _range(ends: Value) -> str:
+def _format_range(ends: Value) -> str:
     lower, upper = ends if isinstance(ends, tuple) else (None, None)
-    return f"{_number(lower, -math.inf):.12g} to {_number(upper):.12g}"
+    return f"{_as_number(lower, -math.inf):.12g} to {_as_number(upper):.12g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,13 +326,13 @@ class Sameness(Displayable):
             changes in `after`.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
-        written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames, for the
-            models as they are written. The bound is infinite if no bound was proven. If one model is a
-            Denavit-Hartenberg table, only frames with the same name in A and B count.
+        bound_as_written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames,
+            for the models as they are written. The bound is infinite if no bound was proven. If one model is
+            a Denavit-Hartenberg table, only frames with the same name in A and B count.
         narrowed: One line of text for each mimicked joint whose range contains values at which a mimic joint
             exceeds its limits. The distances in `frames` are computed for the whole range of the mimicked
             joint.
-        checked: Pinocchio's confirmation, or the reason why there is none.
+        confirmation: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
     >>> import urdfkin
@@ -360,9 +361,9 @@ class Sameness(Displayable):
     unexplained: tuple[JointDifference, ...]
     frames: tuple[Interval, ...]
     as_written: Interval | None
-    written: tuple[float, float]
+    bound_as_written: tuple[float, float]
     narrowed: tuple[str, ...]
-    checked: Confirmation
+    confirmation: Confirmation
     trees: tuple[KinematicTree, KinematicTree]
 
     def __bool__(self) -> bool:
@@ -377,8 +378,8 @@ class Sameness(Displayable):
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
-    def _sheet(self) -> TextDocument:
-        document: TextDocument = hook("a comparison as a document")(self)
+    def _text_document(self) -> TextDocument:
+        document: TextDocument = get_hook("a comparison as a document")(self)
         return document
 
     @property
@@ -436,8 +437,12 @@ class Sameness(Displayable):
         """
         if self.single is None or self.verdict is not Verdict.DIFFERS:
             return False
-        explained = {one.what for one in self.differences} <= BOUNDED
-        return explained and self.written[0] <= self.single[0] and self.written[1] <= self.single[1]
+        explained = {one.what for one in self.differences} <= BOUNDED_DIFFERENCES
+        return (
+            explained
+            and self.bound_as_written[0] <= self.single[0]
+            and self.bound_as_written[1] <= self.single[1]
+        )
 
     def within(self, most: float) -> bool:
         """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
@@ -452,7 +457,9 @@ class Sameness(Displayable):
         >>> found.within(0.01), found.within(1.0)
         (False, True)
         """
-        return {one.what for one in self.differences} <= BOUNDED and max(self.written) <= most
+        return {one.what for one in self.differences} <= BOUNDED_DIFFERENCES and max(
+            self.bound_as_written
+        ) <= most
 
     def holds(self, question: SameQuestion) -> bool:
         """Return whether the answer to a question is yes.
@@ -618,7 +625,7 @@ def size_words(metres: float, radians: float) -> str:
     return " and ".join(parts)
 
 
-def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
+def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):
@@ -656,10 +663,10 @@ def changes_of_b(
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
             least = rounding.angle if step.kind == "turns" else rounding.distance
-            offset = _rounded(step.offset, least)
+            offset = _remove_rounding(step.offset, least)
             twelfth = nearest_twelfth(offset)
             if step.kind == "turns" and abs(offset - twelfth) <= 2.0 * least:
-                size = units_of().angle(abs(twelfth))
+                size = parse_units().format_angle(abs(twelfth))
             else:
                 size = repr(abs(offset))
             constant = f" {'-' if offset < 0 else '+'} {size}" if offset else ""
@@ -747,13 +754,13 @@ def _conversion_words(
 def pose_words(T: FloatArray, rounding: Tolerance) -> str:
     xyz, rpy = T[:3, 3], rpy_of(T[:3, :3])
     words = (
-        " ".join(repr(_rounded(float(x), least)) for x in numbers)
+        " ".join(repr(_remove_rounding(float(x), least)) for x in numbers)
         for numbers, least in ((xyz, rounding.distance), (rpy, rounding.angle))
     )
     return 'xyz="{}" rpy="{}"'.format(*words)
 
 
-def _rounded(x: float, rounding: float) -> float:
+def _remove_rounding(x: float, rounding: float) -> float:
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 
@@ -761,7 +768,7 @@ def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
     # `same` can store a mimic joint with the multiplier 0 as a fixed joint.
     # The child link of this joint is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
-        if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
+        if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
             return False
         if any(joint.parent == link for joint in tree.joints):
             return False
@@ -794,13 +801,13 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
     links_of_b = {label: link for link, label in enumerate(alignment.b.labels)}
     for link, label in enumerate(alignment.a.labels):
         other = links_of_b.get(label)
-        if other is not None and link not in have and _on_matched_bodies(alignment, link, other):
+        if other is not None and link not in have and _is_on_matched_bodies(alignment, link, other):
             ours, theirs = _carrier(tree_a, link), _carrier(tree_b, other)
             ordered.append(Difference(f"link {tree_a.links[link]}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
-def _on_matched_bodies(alignment: Alignment, link: int, other: int) -> bool:
+def _is_on_matched_bodies(alignment: Alignment, link: int, other: int) -> bool:
     return all(
         mechanism.body_of[index] not in {mechanism.body_of[j + 1] for j in only}
         for mechanism, only, index in (
@@ -860,7 +867,7 @@ def remarks(
             zero = (1, 0.0) if as_written else (step.sense, step.offset)
             some += limit_differences(a, b, tolerance.angle, single, zero)
     for tree, which in ((alignment.a.tree, "A"), (alignment.b.tree, "B")):
-        for lock in filter(None, map(idle, tree.joints)):
+        for lock in filter(None, map(is_idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
     # A joint can be independent in B and a mimic joint in A, although all joint values agree.
@@ -884,7 +891,7 @@ def _in_order(which: str, value: Value) -> tuple[Value, Value]:
     return (value, None) if which == "A" else (None, value)
 
 
-def idle(joint: Joint) -> Lock | None:
+def is_idle(joint: Joint) -> Lock | None:
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 

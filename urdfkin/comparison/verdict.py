@@ -10,10 +10,10 @@ from itertools import takewhile
 
 import numpy as np
 
-from urdfkin.comparison.bounds import MOST_BOXES, DistanceSearch, pinocchio_poses, tighten
+from urdfkin.comparison.bounds import MAX_BOXES, DistanceSearch, pinocchio_poses, tighten
 from urdfkin.comparison.result import (
-    BOUNDED,
-    FREE,
+    BOUNDED_DIFFERENCES,
+    EQUIVALENCE_KINDS,
     Confirmation,
     Interval,
     JointDifference,
@@ -23,7 +23,7 @@ from urdfkin.comparison.result import (
     Verdict,
     angle,
     changes_of_b,
-    demand_joint_names,
+    check_joint_names,
     differences,
     length,
     remarks,
@@ -31,7 +31,7 @@ from urdfkin.comparison.result import (
 )
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import real_number, whole_number
+from urdfkin.errors.validators import as_finite_float, as_int
 from urdfkin.kinematics.roundings import EPS, SINGLE_ROUNDOFF
 from urdfkin.model.configuration import ASSUMED_LIMIT, range_reductions
 from urdfkin.model.conventions.convention import spellings
@@ -60,14 +60,14 @@ from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
-CONFIRMED = 8
+CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: For the unchanged models, also the maximum number of frames whose largest distance is searched.
-FARTHEST = 4
+MAX_FARTHEST_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
-LONGEST = 1e150
+MAX_PATH_LENGTH = 1e150
 #: An upper bound is sharp enough if it is at most this factor times the largest distance found.
-NEAR = 1.05
+SHARP_FACTOR = 1.05
 
 
 def same(
@@ -76,7 +76,7 @@ def same(
     *,
     map: Mapping[str, str] | None = None,
     bounds: bool = True,
-    boxes: int = MOST_BOXES,
+    boxes: int = MAX_BOXES,
     within: float | None = None,
 ) -> Sameness:
     """Decide and prove whether two models move alike in every configuration.
@@ -116,18 +116,18 @@ def same(
         False
     """
     robots = (as_robot(a), as_robot(b))
-    joint_map = _parse_map(map)
-    whole_number(boxes, "boxes", 0)
+    joint_map = _as_joint_map(map)
+    as_int(boxes, "boxes", 0)
     if within is not None:
-        within = real_number(within, "within")
+        within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
-        demand_joint_names(robot.tree, list(names), which)
+        check_joint_names(robot.tree, list(names), which)
     # The comparison stores compiled trees in the robots that it uses.
     # `same` therefore copies the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
-def _parse_map(joint_map: Mapping[str, str] | None) -> dict[str, str]:
+def _as_joint_map(joint_map: Mapping[str, str] | None) -> dict[str, str]:
     if joint_map is None:
         return {}
     if not isinstance(joint_map, Mapping) or any(
@@ -148,29 +148,30 @@ class Comparator:
         robots: tuple[Robot, Robot],
         joint_map: dict[str, str],
         bounds: bool,
-        boxes: int = MOST_BOXES,
+        boxes: int = MAX_BOXES,
         within: float | None = None,
     ) -> None:
         self.robots, self.joint_map, self.bounds, self.boxes = robots, joint_map, bounds, boxes
         self.within = within
         self.trees = a, b = robots[0].tree, robots[1].tree
-        labels, self.spellings = _spelled_alike(robots)
+        labels, self.spellings = _match_usd_spellings(robots)
         swapped = labels[1], labels[0]
         names = {**self.spellings, **joint_map}
         trees = (
-            _with_idle_joints_fixed(a, b, names, labels),
-            _with_idle_joints_fixed(b, a, _reversed(names), swapped),
+            _fix_idle_joints(a, b, names, labels),
+            _fix_idle_joints(b, a, _swap_pairs(names), swapped),
         )
         self.mechanisms = (
-            Mechanism(trees[0], _fixed_only_here(*trees, self.spellings, labels), labels[0]),
+            Mechanism(trees[0], _joints_fixed_in_one(*trees, self.spellings, labels), labels[0]),
             Mechanism(
-                trees[1], _fixed_only_here(*trees[::-1], _reversed(self.spellings), swapped), labels[1]
+                trees[1], _joints_fixed_in_one(*trees[::-1], _swap_pairs(self.spellings), swapped), labels[1]
             ),
         )
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
-            if not mechanism.size <= LONGEST:
+            if not mechanism.size <= MAX_PATH_LENGTH:
                 raise InputError(
-                    f"a path from the root to a link is longer than {LONGEST:g} m: its square overflows",
+                    f"a path from the root to a link is longer than {MAX_PATH_LENGTH:g} m:"
+                    " its square overflows",
                     where=f"model {which}, {robot.name}",
                     found=f"{mechanism.size:.6g} m",
                     remedy="write origins in metres",
@@ -184,18 +185,20 @@ class Comparator:
         variables = variables_of(alignment, self.tolerance)
         result = self.result_without_bounds(alignment, variables)
         if not self.bounds:
-            return replace(result, checked=self._confirm(alignment, variables, ()))
+            return replace(result, confirmation=self._confirm(alignment, variables, ()))
         frames = self._intervals(alignment, variables)
         farthest, bound = None, _largest([(frame.upper, frame.radians) for frame in frames])
         if result.after:
-            written = self.as_written(alignment)
+            written = self.align_as_written(alignment)
             moving = variables_of(written, self.tolerance)
             farthest = self._farthest_as_written(written, moving)
             bound = self._bound_as_written(written, moving, farthest)
-            if len(written.frames) < len(self._compared_links(alignment)):
+            if len(written.frames) < len(self._comparable_links(alignment)):
                 bound = math.inf, math.inf
         checked = self._confirm(alignment, variables, frames)
-        return replace(result, frames=frames, as_written=farthest, written=bound, checked=checked)
+        return replace(
+            result, frames=frames, as_written=farthest, bound_as_written=bound, confirmation=checked
+        )
 
     def alignment(self) -> Alignment:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
@@ -211,14 +214,16 @@ class Comparator:
         verdict = Verdict.DIFFERS if different else Verdict.SAME_AFTER if changes else Verdict.SAME
         unexplained = () if verdict is Verdict.SAME else self._unexplained_differences(alignment)
         if single is not None and verdict is not Verdict.SAME and not unexplained:
-            verdict = Verdict.UP_TO_SINGLE if {one.what for one in different} <= BOUNDED else verdict
+            verdict = (
+                Verdict.UP_TO_SINGLE if {one.what for one in different} <= BOUNDED_DIFFERENCES else verdict
+            )
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
             digests=(self.robots[0].sha256, self.robots[1].sha256),
             verdict=verdict,
             after=tuple(dict.fromkeys(words for _, words in changes)),
-            up_to=tuple(kind for kind in FREE if kind in kinds),
+            up_to=tuple(kind for kind in EQUIVALENCE_KINDS if kind in kinds),
             differences=different,
             remarks=remarks(
                 alignment,
@@ -240,19 +245,21 @@ class Comparator:
             base_links=(links[0][alignment.base[0]], links[1][alignment.base[1]]),
             rounding=self.rounding(alignment, variables),
             unlimited=tuple(
-                names[0][step.a] for step, travel in _travels(alignment, variables) if math.isinf(travel)
+                names[0][step.a]
+                for step, travel in _iterate_travels(alignment, variables)
+                if math.isinf(travel)
             ),
             single=single,
             unexplained=unexplained,
             frames=(),
             as_written=None,
-            written=(math.inf, math.inf),
+            bound_as_written=(math.inf, math.inf),
             narrowed=tuple(
                 f"{which}: {words}"
                 for which, tree in zip("AB", self.trees, strict=True)
                 for words in range_reductions(tree)
             ),
-            checked=Confirmation("not asked", reason="the bounds are not computed yet"),
+            confirmation=Confirmation("not asked", reason="the bounds are not computed yet"),
             trees=self.trees,
         )
 
@@ -284,19 +291,19 @@ class Comparator:
         )
         if found or not (errors[0].any() or errors[1].any()):
             return found
-        back = align(b, a, _reversed(alignment.names))
+        back = align(b, a, _swap_pairs(alignment.names))
         other = JointComparison(back, (errors[1], errors[0]), base_as_written(b, a), self.tolerance)
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
-    def as_written(self, alignment: Alignment) -> Alignment:
+    def align_as_written(self, alignment: Alignment) -> Alignment:
         """Return the alignment of the unchanged models, with the pairs of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
-        written.frames = written.frames_of(self._compared_links(alignment))
+        written.frames = written.frames_of(self._comparable_links(alignment))
         return written
 
-    def _compared_links(self, alignment: Alignment) -> list[tuple[int, int]]:
+    def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
         # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
@@ -333,7 +340,8 @@ class Comparator:
             if pair is not None
         ]
         travels = [
-            ASSUMED_LIMIT if math.isinf(travel) else travel for _, travel in _travels(alignment, variables)
+            ASSUMED_LIMIT if math.isinf(travel) else travel
+            for _, travel in _iterate_travels(alignment, variables)
         ]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
         slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
@@ -350,7 +358,9 @@ class Comparator:
         search = self.search(alignment, variables)
         largest = search.largest_distances([frames[k] for k in different])
         worst = dict(zip(different, largest, strict=True))
-        self._sharpen(uppers, frames, search, NEAR * max((metres for metres, _ in largest), default=0.0))
+        self._sharpen(
+            uppers, frames, search, SHARP_FACTOR * max((metres for metres, _ in largest), default=0.0)
+        )
         return tuple(
             self._interval(
                 alignment, frame, search, worst.get(k), (uppers[k][0] + metres, uppers[k][1] + radians)
@@ -378,7 +388,7 @@ class Comparator:
         uppers = [upper_bounds(alignment, variables, frame) for frame in frames]
         different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         fine = set[int]()
-        while len(fine) < min(FARTHEST, len(different)):
+        while len(fine) < min(MAX_FARTHEST_FRAMES, len(different)):
             widest = max(different, key=lambda k: uppers[k])
             if widest in fine:
                 break
@@ -408,8 +418,8 @@ class Comparator:
             return None
         metres, radians = self.rounding(written, variables)
         search = self.search(written, variables, as_written=True)
-        distances = search.sampled_distances(written.frames)[0].max(axis=0)
-        far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:FARTHEST]]
+        distances = search.sample_distances(written.frames)[0].max(axis=0)
+        far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
         # If no position differs, the frame with the largest angle counts.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
@@ -462,12 +472,14 @@ class Comparator:
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
-        return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(distances.max(initial=0.0)))
+        return Confirmation(
+            "confirmed", PINOCCHIO.words, CONFIRMATION_SAMPLES, float(distances.max(initial=0.0))
+        )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Compute each frame's largest distance (m) at `CONFIRMED` configurations with Pinocchio."""
+        """Compute each frame's largest distance (m) in random configurations with Pinocchio."""
         search = self.search(alignment, variables)
-        q_a, q_b = search.configurations(search.random_values(CONFIRMED), moved=True)
+        q_a, q_b = search.configurations(search.random_values(CONFIRMATION_SAMPLES), random_free_joints=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
         return np.asarray(distances.max(axis=0, initial=0.0))
 
@@ -476,11 +488,11 @@ def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return max((m for m, _ in bounds), default=0.0), max((r for _, r in bounds), default=0.0)
 
 
-def _reversed(names: Mapping[str, str]) -> dict[str, str]:
+def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
     return {theirs: ours for ours, theirs in names.items()}
 
 
-def _travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
+def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
     """Yield each matched joint that translates, and its largest travel (m); infinite without limits."""
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
@@ -489,7 +501,7 @@ def _travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[Match
             yield step, max(map(abs, variables.range(pair.a)))
 
 
-def _fixed_only_here(
+def _joints_fixed_in_one(
     tree: KinematicTree,
     other: KinematicTree,
     names: Mapping[str, str],
@@ -508,7 +520,7 @@ def _fixed_only_here(
     }
 
 
-def _with_idle_joints_fixed(
+def _fix_idle_joints(
     tree: KinematicTree,
     other: KinematicTree,
     names: Mapping[str, str],
@@ -535,7 +547,7 @@ def _never_moves(joint: Joint) -> bool:
     return joint.mimic is not None and joint.mimic.multiplier == 0.0
 
 
-def _spelled_alike(
+def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
     """Return the link names of both robots, and the pairs of joints that USD spells differently.
@@ -547,15 +559,15 @@ def _spelled_alike(
         other = robots[1 - k]
         if not is_usd(own.source) or is_usd(other.source):
             continue
-        for link, name in _originals(other.tree.links, own.tree.links).items():
+        for link, name in _original_names(other.tree.links, own.tree.links).items():
             labels[k][own.tree.link_index(link)] = name
         names = [[joint.name for joint in robot.tree.joints] for robot in (other, own)]
-        for joint, name in _originals(*names).items():
+        for joint, name in _original_names(*names).items():
             joints |= {name: joint} if k else {joint: name}
     return (labels[0], labels[1]), joints
 
 
-def _originals(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
+def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
     """Map the spelling in the USD file to the original name in `names`."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
@@ -578,7 +590,7 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     return IDENTITY
 
 
-def parse_map(words: tuple[str, ...]) -> dict[str, str]:
+def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:
     pairs = dict[str, str]()
     for word in words:
         ours, _, theirs = word.partition("=")

@@ -31,7 +31,7 @@ from typing import NamedTuple, assert_never
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import in_parts, placements, velocities
+from urdfkin.compiled.evaluate import compute_in_parts, placements, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.errors.display import Displayable, Table, TextDocument
@@ -41,8 +41,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order of the array `terms`.
-KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-_MOST_SHOWN = 2
+ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
+_MAX_DISPLAYED = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,8 +53,8 @@ class AccelerationBreakdown(Displayable):
         joints: Names of the moving joints from the base to the frame.
         base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
             moved.
-        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
-            and the six numbers are [linear; angular].
+        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of
+            `ACCELERATION_KINDS`, and the six numbers are [linear; angular].
     """
 
     joints: tuple[str, ...]
@@ -69,19 +69,19 @@ class AccelerationBreakdown(Displayable):
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):
-            for k, kind in enumerate(KINDS):
+            for k, kind in enumerate(ACCELERATION_KINDS):
                 if self.terms[(*sample, j, k)].any():
                     yield joint, kind, self.terms[(*sample, j, k)]
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
         batch = self.base.shape[:-1]
         parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]
-        for sample in list(np.ndindex(*batch))[:_MOST_SHOWN]:
+        for sample in list(np.ndindex(*batch))[:_MAX_DISPLAYED]:
             parts += [f"sample {list(sample)}"] if sample else []
             rows = [(joint, kind, *six.tolist()) for joint, kind, six in self.contributions(sample)]
             parts.append(Table(heads, [*rows, ("sum", "", *self.total[sample].tolist())], left=2))
-        if (more := math.prod(batch) - _MOST_SHOWN) > 0:
+        if (more := math.prod(batch) - _MAX_DISPLAYED) > 0:
             parts.append(f"... and {more} more samples")
         return TextDocument("Acceleration by joint and kind", parts)
 
@@ -94,21 +94,21 @@ class AccelerationBreakdown(Displayable):
     @cached_property
     def by_joint(self) -> FloatArray:
         """The contribution of each joint (..., joints, 6)."""
-        summed: FloatArray = self.terms.sum(axis=-2)
-        return summed
+        total: FloatArray = self.terms.sum(axis=-2)
+        return total
 
     @cached_property
     def by_kind(self) -> FloatArray:
         """The contribution of each kind (..., 4, 6), summed over the joints."""
-        summed: FloatArray = self.terms.sum(axis=-3)
-        return summed
+        total: FloatArray = self.terms.sum(axis=-3)
+        return total
 
 
-class _Moves(NamedTuple):
+class _RelativeMotion(NamedTuple):
     """Velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
 
-    slide: FloatArray
-    turn: FloatArray
+    linear: FloatArray
+    angular: FloatArray
 
 
 def acceleration_breakdown(
@@ -132,13 +132,13 @@ def acceleration_breakdown(
     moving = moving_joints(tree, link)
     plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # The frames are all links on the path.
     n = len(q)
-    terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
-    of_base = np.empty((n, 6))
+    terms = np.empty((n, len(moving), len(ACCELERATION_KINDS), 6)) if out is None else out
+    base_acceleration = np.empty((n, 6))
 
     def compute(part: slice) -> None:
         state = base if len(base) == 1 else base[part]
         try:
-            of_base[part] = _contributions(
+            base_acceleration[part] = _contributions(
                 tree, link, plan, q[part], v[part], a[part], reference, state, terms[part]
             )
         except RangeError as error:
@@ -147,8 +147,8 @@ def acceleration_breakdown(
             where = f"samples {part.start} to {part.stop - 1}"
             raise RangeError(error.what, where=where, remedy=error.remedy) from error
 
-    in_parts(compute, n, threads)
-    return AccelerationBreakdown(tuple(tree.joints[i].name for i in moving), of_base, terms)
+    compute_in_parts(compute, n, threads)
+    return AccelerationBreakdown(tuple(tree.joints[i].name for i in moving), base_acceleration, terms)
 
 
 def moving_joints(tree: KinematicTree, link: int) -> list[int]:
@@ -176,17 +176,19 @@ def _contributions(
     for place, (k, i) in enumerate(moving):
         R, d, w_before = Ts[:, k + 1, :3, :3], levers[:, k + 1], velocity[:, k, 3:]
         joint, at = tree.joints[i], tree.v_index[i]
-        terms[:, place] = _terms(_moves(joint, v[:, at:], R), _moves(joint, a[:, at:], R), w_before, d)
-    of_base = _rigid(base, levers[:, 0])
+        terms[:, place] = _joint_terms(
+            _relative_motion(joint, v[:, at:], R), _relative_motion(joint, a[:, at:], R), w_before, d
+        )
+    base_acceleration = _base_acceleration(base, levers[:, 0])
     if reference.own_axes:
         back = Ts[:, -1, :3, :3].swapaxes(-1, -2)
-        of_base = _rotate(back, of_base)
-        terms[...] = _rotate(back[:, np.newaxis, np.newaxis], terms)
-    if not (np.isfinite(of_base).all() and np.isfinite(terms).all()):
+        base_acceleration = _rotate_six_vectors(back, base_acceleration)
+        terms[...] = _rotate_six_vectors(back[:, np.newaxis, np.newaxis], terms)
+    if not (np.isfinite(base_acceleration).all() and np.isfinite(terms).all()):
         raise RangeError(
             "a part of the acceleration leaves the range of double precision", remedy="give smaller numbers"
         )
-    return of_base
+    return base_acceleration
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
@@ -194,64 +196,72 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
-        own = joint.T_parent_joint[:3, 3] + _slide(joint, q[:, at:]) @ joint.T_parent_joint[:3, :3].T
+        own = (
+            joint.T_parent_joint[:3, 3]
+            + _joint_translation(joint, q[:, at:]) @ joint.T_parent_joint[:3, :3].T
+        )
         levers[:, k] = (Rs[:, k] @ own[..., np.newaxis])[..., 0] + levers[:, k + 1]
     return levers
 
 
-def _slide(joint: Joint, q: FloatArray) -> FloatArray:
+def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
     """Return a joint's translation (n, 3) in the joint's axes."""
-    slide = np.zeros((len(q), 3))
+    translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
-            slide[:, :2] = q[:, :2]
+            translation[:, :2] = q[:, :2]
         case JointKind.FLOATING:
-            slide[:] = q[:, :3]
+            translation[:] = q[:, :3]
         case JointKind.PRISMATIC:
             value = joint.mimic.multiplier * q[:, :1] + joint.mimic.offset if joint.mimic else q[:, :1]
-            slide[:] = value * joint.axis
+            translation[:] = value * joint.axis
         case JointKind.REVOLUTE | JointKind.CONTINUOUS | JointKind.FIXED:
             pass
         case _:
             assert_never(joint.kind)
-    return slide
+    return translation
 
 
-def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the contributions (n, 4, 6) of one joint, in the order of `KINDS`."""
+def _joint_terms(
+    rate: _RelativeMotion, rate_2: _RelativeMotion, w_before: FloatArray, d: FloatArray
+) -> FloatArray:
+    """Return the contributions (n, 4, 6) of one joint, in the order of `ACCELERATION_KINDS`."""
     nothing = np.zeros_like(d)
-    u = eq.point_velocity(rate.slide, rate.turn, d)
+    u = eq.point_velocity(rate.linear, rate.angular, d)
     kinds = (
-        (eq.transverse(rate_2.turn, d), rate_2.turn),
-        (eq.centripetal(rate.turn, d), nothing),
-        (eq.coriolis(w_before, u) + eq.axis_rate(rate.turn, rate.slide), eq.axis_rate(w_before, rate.turn)),
-        (rate_2.slide, nothing),
+        (eq.transverse(rate_2.angular, d), rate_2.angular),
+        (eq.centripetal(rate.angular, d), nothing),
+        (
+            eq.coriolis(w_before, u) + eq.axis_rate(rate.angular, rate.linear),
+            eq.axis_rate(w_before, rate.angular),
+        ),
+        (rate_2.linear, nothing),
     )
     return np.stack([np.concatenate(pair, axis=-1) for pair in kinds], axis=-2)
 
 
-def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
-    slide, turn = np.zeros((len(x), 3)), np.zeros((len(x), 3))
+def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMotion:
+    linear, angular = np.zeros((len(x), 3)), np.zeros((len(x), 3))
     if joint.kind is JointKind.PLANAR:
-        slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]
+        linear[:, :2], angular[:, 2] = x[:, :2], x[:, 2]
     elif joint.kind is JointKind.FLOATING:
-        slide[:], turn[:] = x[:, :3], x[:, 3:6]
+        linear[:], angular[:] = x[:, :3], x[:, 3:6]
     elif not joint.kind.has_axis:
         raise NotImplementedError(f"the motion of a {joint.kind} joint")
     else:
         factor = joint.mimic.multiplier if joint.mimic else 1.0
-        (turn if joint.kind.turns else slide)[:] = factor * x[:, :1] * joint.axis
-    return _Moves((R @ slide[..., np.newaxis])[..., 0], (R @ turn[..., np.newaxis])[..., 0])
+        (angular if joint.kind.turns else linear)[:] = factor * x[:, :1] * joint.axis
+    return _RelativeMotion((R @ linear[..., np.newaxis])[..., 0], (R @ angular[..., np.newaxis])[..., 0])
 
 
-def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
+def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
     """Return the acceleration (7.123) of a point fixed to the base, at `d` from the base's origin."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)
 
 
-def _rotate(R: FloatArray, six: FloatArray) -> FloatArray:
+def _rotate_six_vectors(R: FloatArray, six: FloatArray) -> FloatArray:
     pairs = six.reshape(*six.shape[:-1], 2, 3)
-    turned: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
-    return turned.reshape(six.shape)
+    rotated: FloatArray = (R[..., np.newaxis, :, :] @ pairs[..., np.newaxis])[..., 0]
+    return rotated.reshape(six.shape)

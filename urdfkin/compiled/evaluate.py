@@ -27,45 +27,45 @@ from urdfkin.compiled.plan import (
     KernelArgs,
     KernelProgram,
     address,
-    lines,
-    program_of,
-    scratch,
+    aligned_empty,
+    compile_program,
+    make_scratch,
 )
 from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.errors.validators import whole_number
+from urdfkin.errors.validators import as_int
 from urdfkin.model.base_motion import FIXED_BASE_STATE, subtract_gravity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
+_INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: Results of at least this many bytes do not fit into the caches and are written directly to memory.
-_STREAMED = 2 << 20
+_MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results; they fill half of the first-level cache.
-_MOST_STAGED = 3072
+_MAX_BUFFER_SIZE = 3072
 
-_STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
+_STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
 
 
 class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
     `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous float64 array of the
-    result's size. `read` is true if the caller reads the results immediately, so that the results stay in the
-    caches.
+    result's size. `keep_in_cache` is true if the caller reads the results immediately, so that the results
+    stay in the caches.
     """
 
     base: FloatArray
     out: FloatArray | None
     threads: int | None
-    read: bool
+    keep_in_cache: bool
 
 
-def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[EvaluateOptions]) -> FloatArray:
+def placements(plan: CompiledTree, q: FloatArray, **options: Unpack[EvaluateOptions]) -> FloatArray:
     """Return T_world_frame (n, frames, 4, 4); equation 7.77 gives the positions."""
-    program = program_of(plan, turned=True)
-    return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
+    program = compile_program(plan, orientations=True)
+    return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **options)
 
 
 def velocities(
@@ -73,12 +73,12 @@ def velocities(
     q: FloatArray,
     v: FloatArray,
     reference: Reference = _ALIGNED,
-    **how: Unpack[EvaluateOptions],
+    **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return velocities (n, frames, 6), [linear; angular], by equations 7.127 and 7.128."""
     local = reference.own_axes
     name = "local_velocities" if local else "velocities"
-    return _compute(name, plan, program_of(plan, turned=local), [q, v], reference, (6,), **how)
+    return _compute(name, plan, compile_program(plan, orientations=local), [q, v], reference, (6,), **options)
 
 
 def accelerations(
@@ -87,20 +87,22 @@ def accelerations(
     v: FloatArray,
     a: FloatArray,
     reference: Reference = _ALIGNED,
-    **how: Unpack[EvaluateOptions],
+    **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return classical accelerations (n, frames, 6), [linear; angular], by equations 7.129 and 7.130."""
     local = reference.own_axes
     name = "local_accelerations" if local else "accelerations"
-    return _compute(name, plan, program_of(plan, turned=local), [q, v, a], reference, (6,), **how)
+    return _compute(
+        name, plan, compile_program(plan, orientations=local), [q, v, a], reference, (6,), **options
+    )
 
 
 def jacobians(
-    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **options: Unpack[EvaluateOptions]
 ) -> FloatArray:
     """Return Jacobians (n, frames, 6, nv) by equation 7.85."""
-    program = program_of(plan, turned=reference.own_axes, columns=True)
-    return _compute("jacobians", plan, program, [q], reference, (6, plan.nv), **how)
+    program = compile_program(plan, orientations=reference.own_axes, columns=True)
+    return _compute("jacobians", plan, program, [q], reference, (6, plan.nv), **options)
 
 
 def jacobian_rates(
@@ -108,22 +110,22 @@ def jacobian_rates(
     q: FloatArray,
     v: FloatArray,
     reference: Reference = _ALIGNED,
-    **how: Unpack[EvaluateOptions],
+    **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return time derivatives J-dot of Jacobians (n, frames, 6, nv) by equation 7.126."""
-    program = program_of(plan, turned=reference.own_axes, columns=True)
-    return _compute("jacobian_rates", plan, program, [q, v], reference, (6, plan.nv), **how)
+    program = compile_program(plan, orientations=reference.own_axes, columns=True)
+    return _compute("jacobian_rates", plan, program, [q, v], reference, (6, plan.nv), **options)
 
 
 def hessians(
-    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **options: Unpack[EvaluateOptions]
 ) -> FloatArray:
     """Return Hessians (n, frames, 6, nv, nv).
 
     Entry [..., i, j] is the derivative of Jacobian column i in the direction of the joint velocity j.
     """
-    program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
-    return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
+    program = compile_program(plan, orientations=reference.own_axes, columns=True, hessian=True)
+    return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **options)
 
 
 def imus(
@@ -133,12 +135,12 @@ def imus(
     a: FloatArray,
     *,
     gravity: FloatArray,
-    **how: Unpack[EvaluateOptions],
+    **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes."""
-    how["base"] = subtract_gravity(how.get("base", FIXED_BASE_STATE), gravity)
-    program = program_of(plan, turned=True)
-    return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
+    options["base"] = subtract_gravity(options.get("base", FIXED_BASE_STATE), gravity)
+    program = compile_program(plan, orientations=True)
+    return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **options)
 
 
 def _compute(
@@ -152,21 +154,23 @@ def _compute(
     base: FloatArray = FIXED_BASE_STATE,
     out: FloatArray | None = None,
     threads: int | None = None,
-    read: bool = False,
+    keep_in_cache: bool = False,
 ) -> FloatArray:
     """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a."""
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
     # In an array with the stride 0, all rows are the same row of memory.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
-    if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
-        odd = _compiled(name, program, reference, inputs, out, threads, staged=is_staged(out) and not read)
-    if odd or plan.is_large or _is_large(base):
+    if (invalid := _compute_interpreted(name, program, reference, inputs, out, threads)) is None:
+        invalid = _compute_compiled(
+            name, program, reference, inputs, out, threads, buffered=uses_buffer(out) and not keep_in_cache
+        )
+    if invalid or plan.is_large or _is_large(base):
         _check_finite(inputs, out)
     return out
 
 
-def _interpreted(
+def _compute_interpreted(
     name: str,
     program: KernelProgram,
     reference: Reference,
@@ -178,40 +182,40 @@ def _interpreted(
 
     Otherwise, return 1 if an input is nan, infinite or too large, else 0.
     """
-    if preload.kernel(name) is not None:
+    if preload.get_kernel(name) is not None:
         return None
     if threads is not None:
-        whole_number(threads, "threads", 1)
-    recursion, least, odd = getattr(recursions, name), math.inf, 0
+        as_int(threads, "threads", 1)
+    recursion, least, invalid = getattr(recursions, name), math.inf, 0
     flat = out.reshape(len(out), math.prod(out.shape[1:]))
     for i, row in enumerate(flat):
         begin, result = time.thread_time(), [0.0] * len(row)
-        odd |= recursion(_lists(program, reference, inputs, i, result))
+        invalid |= recursion(_list_args(program, reference, inputs, i, result))
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
-        preload.spend(name, took)
+        preload.add_time(name, took)
         # The first configuration takes longer than later configurations, so its time is not representative.
-        if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
+        if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least) is not None:
             return None
-    return odd
+    return invalid
 
 
-def _lists(
+def _list_args(
     program: KernelProgram, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
 ) -> list[Any]:
-    task: list[Any] = [0] * len(KernelArgs)
-    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
-    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
-    task[KernelArgs.REFERENCE] = REFERENCES[reference]
-    task[KernelArgs.N], task[KernelArgs.WIDTH] = 1, len(result)
-    for place, x in zip(_PLACES, inputs, strict=False):
-        task[place] = x[0 if len(x) == 1 else i].tolist()
+    args: list[Any] = [0] * len(KernelArgs)
+    args[KernelArgs.PROGRAM], args[KernelArgs.CONSTANTS] = program.lists
+    args[KernelArgs.SCRATCH], args[KernelArgs.OUT] = [None] * program.rows, result
+    args[KernelArgs.REFERENCE] = REFERENCES[reference]
+    args[KernelArgs.N], args[KernelArgs.OUTPUT_WIDTH] = 1, len(result)
+    for index, x in zip(_INPUT_ARGS, inputs, strict=False):
+        args[index] = x[0 if len(x) == 1 else i].tolist()
     if inputs[0] is FIXED_BASE_STATE:
-        task[KernelArgs.BASE] = 0
-    return task
+        args[KernelArgs.BASE] = 0
+    return args
 
 
-def _compiled(
+def _compute_compiled(
     name: str,
     program: KernelProgram,
     reference: Reference,
@@ -219,45 +223,45 @@ def _compiled(
     out: FloatArray,
     threads: int | None,
     *,
-    staged: bool,
+    buffered: bool,
 ) -> int:
-    core = preload.kernel(name)
+    kernel = preload.get_kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-        task, alive = task_of(program, reference, parts, part, staged=staged)
-        outcome: int = core(address(task))
+        args, alive = make_kernel_args(program, reference, parts, part, buffered=buffered)
+        outcome: int = kernel(address(args))
         del alive
         return outcome
 
-    return in_blocks(compute, inputs, out, threads)
+    return compute_in_blocks(compute, inputs, out, threads)
 
 
-def is_staged(out: FloatArray) -> bool:
+def uses_buffer(out: FloatArray) -> bool:
     """Return whether results are collected in a buffer and then written in whole cache lines."""
-    return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
+    return out.nbytes >= _MIN_BUFFERED_BYTES and LANES * out[0].size <= _MAX_BUFFER_SIZE
 
 
-def task_of(
+def make_kernel_args(
     program: KernelProgram,
     reference: Reference,
     inputs: Sequence[FloatArray],
     out: FloatArray,
     *,
-    staged: bool,
+    buffered: bool,
 ) -> tuple[NDArray[np.int64], object]:
     """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished."""
-    width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
-    stage = lines(LANES * width if staged else 0)
-    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
-    task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = address(memory), address(out)
-    task[KernelArgs.N], task[KernelArgs.WIDTH] = len(out), width
-    task[KernelArgs.REFERENCE] = REFERENCES[reference]
-    task[KernelArgs.STAGE] = address(stage) if staged else 0
-    for place, of_place, x in zip(_PLACES, _STRIDES, inputs, strict=False):
-        task[place], task[of_place] = address(x), 0 if len(x) == 1 else x.shape[1]
+    width, memory, args = out[0].size, make_scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
+    buffer = aligned_empty(LANES * width if buffered else 0)
+    args[KernelArgs.PROGRAM], args[KernelArgs.CONSTANTS] = program.addresses
+    args[KernelArgs.SCRATCH], args[KernelArgs.OUT] = address(memory), address(out)
+    args[KernelArgs.N], args[KernelArgs.OUTPUT_WIDTH] = len(out), width
+    args[KernelArgs.REFERENCE] = REFERENCES[reference]
+    args[KernelArgs.BUFFER] = address(buffer) if buffered else 0
+    for index, stride_index, x in zip(_INPUT_ARGS, _STRIDE_ARGS, inputs, strict=False):
+        args[index], args[stride_index] = address(x), 0 if len(x) == 1 else x.shape[1]
     if inputs[0] is FIXED_BASE_STATE:
-        task[KernelArgs.BASE] = 0
-    return task, (memory, stage)
+        args[KernelArgs.BASE] = 0
+    return args, (memory, buffer)
 
 
 def _is_large(base: FloatArray) -> bool:
@@ -277,18 +281,18 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 
 
 #: Smaller batches use one thread, because starting a thread takes about ten microseconds.
-_WORTH_THREADS = 4096
+_MIN_THREADED_ROWS = 4096
 
 #: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
-PART = 2048
+ROWS_PER_PART = 2048
 
 #: A function that computes the rows of the argument `out` from the rows of the argument `inputs`.
 #: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
-Compute = Callable[[Sequence[FloatArray], FloatArray], int]
+BlockFunction = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    return _processors() if n >= _WORTH_THREADS else 1
+    return _processors() if n >= _MIN_THREADED_ROWS else 1
 
 
 def _processors() -> int:
@@ -297,14 +301,16 @@ def _processors() -> int:
     return os.cpu_count() or 1  # macOS has no `sched_getaffinity`.
 
 
-def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
+def compute_in_blocks(
+    compute: BlockFunction, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
+) -> int:
     """Compute `out` (n, ...) in several threads; each array of `inputs` is (n, ...) or (1, ...).
 
     All arrays are C-contiguous, and `compute` must release Python's global interpreter lock. The result is 1
     if an input is nan, infinite or too large, else 0.
     """
     n = len(out)
-    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
+    threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     if n == 0:
         return 0
     if (threads := min(threads, n // LANES)) > 1:
@@ -313,35 +319,35 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         return compute(inputs, out)
     work = [
         _pool().submit(compute, [x[part] if len(x) == n else x for x in inputs], out[part])
-        for part in _parts(n, threads)
+        for part in _split_rows(n, threads)
     ]
     return max([future.result() for future in work])  # Each `result()` waits for a thread.
 
 
-def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
+def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n.
 
     If n is 0, `compute` is called once, with an empty slice.
     """
-    threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
-    parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
+    threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
+    parts = [slice(i, min(i + ROWS_PER_PART, n)) for i in range(0, max(n, 1), ROWS_PER_PART)]
     count = min(threads, len(parts), _processors())
-    shares = [parts[k::count] for k in range(count)]
+    parts_by_thread = [parts[k::count] for k in range(count)]
 
-    def compute_all(share: Sequence[slice]) -> None:
-        for part in share:
+    def compute_all(thread_parts: Sequence[slice]) -> None:
+        for part in thread_parts:
             compute(part)
 
-    if len(shares) == 1:
+    if len(parts_by_thread) == 1:
         return compute_all(parts)
-    work = [_pool().submit(compute_all, share) for share in shares]
+    work = [_pool().submit(compute_all, thread_parts) for thread_parts in parts_by_thread]
     wait(work)  # An error is raised only after all threads have finished writing.
     for future in work:
         future.result()
     return None
 
 
-def _parts(n: int, threads: int) -> list[slice]:
+def _split_rows(n: int, threads: int) -> list[slice]:
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [slice(a, b) for a, b in pairwise(edges) if a < b]

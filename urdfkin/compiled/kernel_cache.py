@@ -13,14 +13,14 @@ from pathlib import Path
 
 from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.system.locks import importing, lock_over_forks
+from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
 #: Lock that a thread holds while it imports Numba or compiles a kernel.
 #: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
 #: The import of Numba acquires this lock first and then `logging`'s lock, so `logging`'s lock must be
 #: created earlier.
-compiling = lock_over_forks()
+compile_lock = make_fork_safe_lock()
 
 #: A function with two arguments: the kernel's name, and the duration (s), or None when compilation begins.
 Listener = Callable[[str, float | None], None]
@@ -67,14 +67,14 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 
 
 @cache
-def cache_folder() -> Path | None:
+def kernel_cache_folder() -> Path | None:
     """Return the cache folder of compiled kernels; None if no folder is writable."""
-    with importing:
-        from urdfkin.system.cache import cache_folder
+    with import_lock:
+        from urdfkin.system.cache import make_cache_folder
 
     numba = sys.modules.get("numba")
     chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
     python = sys.implementation.cache_tag + sys.abiflags
     versions = installed_version("numba") or "", installed_version("llvmlite") or "", python
     sources = [*Path(__file__).parent.rglob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
-    return cache_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
+    return make_cache_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)

@@ -8,88 +8,96 @@ from __future__ import annotations
 
 import numpy as np
 
-from urdfkin.compiled.plan import ONE_ROW, OUT_ROW, PAIR_WIDTH, REFERENCES, ZERO_ROW, Head
-from urdfkin.compiled.python_numbers import constant, nothing, numbers_of, put, same, write_rows, zero
-from urdfkin.compiled.recursion import put_vector, vector
+from urdfkin.compiled.plan import HESSIAN_COLUMN_WIDTH, ONE_ROW, OUT_ROW, REFERENCES, ZERO_ROW, ProgramHeader
+from urdfkin.compiled.python_numbers import (
+    array_data,
+    broadcast,
+    load_constant,
+    store_number,
+    unused,
+    write_rows,
+    zero,
+)
+from urdfkin.compiled.recursion import load_vector, store_vector
 from urdfkin.kinematics import equations as eq
 
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
-_FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
+_FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: Scratch rows of the 16 numbers of a pose (`_POSE`).
-#: Scratch rows of the six numbers of a velocity or an acceleration (`_SIX`).
-_POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
-_SIX = np.arange(OUT_ROW, OUT_ROW + 6)
+#: Scratch rows of the 16 numbers of a pose (`_POSE_ROWS`).
+#: Scratch rows of the six numbers of a velocity or an acceleration (`_SIX_ROWS`).
+_POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
+_SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
 
 # -- needed parts of the state ---------------------------------------------------------------------------
 
 
 def _unused_vector():
-    return nothing(), nothing(), nothing()
+    return unused(), unused(), unused()
 
 
-def mask_place(state):
+def mask_for_placement(state):
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
-def mask_velocity(state):
+def mask_for_velocity(state):
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
-def mask_acceleration(state):
+def mask_for_acceleration(state):
     """Mark the linear velocity as unused, because acceleration (7.130) does not depend on it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
-def _no_vector():
+def _zero_vector():
     return zero(), zero(), zero()
 
 
 # -- the result of one frame -----------------------------------------------------------------------------
 
 
-def emit_place(m, s, program, place, sources, b, reference, state, to):
+def write_placement(m, s, program, place, sources, b, reference, state, to):
     R, p = state[0], state[1]
-    _pose_row(s, OUT_ROW, R[0], p[0])
-    _pose_row(s, OUT_ROW + 4, R[1], p[1])
-    _pose_row(s, OUT_ROW + 8, R[2], p[2])
+    _store_pose_row(s, OUT_ROW, R[0], p[0])
+    _store_pose_row(s, OUT_ROW + 4, R[1], p[1])
+    _store_pose_row(s, OUT_ROW + 8, R[2], p[2])
     frames = program[_FRAMES]
-    write_rows(m, s, numbers_of(_POSE), 0, 16, to, (b * frames + place) * 16, frames * 16)
+    write_rows(m, s, array_data(_POSE_ROWS), 0, 16, to, (b * frames + place) * 16, frames * 16)
 
 
-def _pose_row(s, row, x, last):
-    put_vector(s, row, x)
-    put(s, row + 3, last)
+def _store_pose_row(s, row, x, last):
+    store_vector(s, row, x)
+    store_number(s, row + 3, last)
 
 
-def emit_velocity(m, s, program, place, sources, b, reference, state, to):
+def write_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:  # The reference point is the point of the body at the world's origin.
-        vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
-    _emit_six(m, s, program, place, b, vel, w, to)
+        vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
+    _write_six_vector(m, s, program, place, b, vel, w, to)
 
 
-def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
+def write_acceleration(m, s, program, place, sources, b, reference, state, to):
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
-        acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
-    _emit_six(m, s, program, place, b, acc, alpha, to)
+        acc = eq.point_acceleration(acc, alpha, w, eq.minus(_zero_vector(), p))
+    _write_six_vector(m, s, program, place, b, acc, alpha, to)
 
 
-def emit_imu(m, s, program, place, sources, b, reference, state, to):
+def write_imu(m, s, program, place, sources, b, reference, state, to):
     """Write accelerometer and gyroscope readings; the base's acceleration contains -gravity."""
-    _emit_six(m, s, program, place, b, state[5], state[2], to)
+    _write_six_vector(m, s, program, place, b, state[5], state[2], to)
 
 
-def _emit_six(m, s, program, place, b, linear, angular, to):
-    put_vector(s, OUT_ROW, linear)
-    put_vector(s, OUT_ROW + 3, angular)
+def _write_six_vector(m, s, program, place, b, linear, angular, to):
+    store_vector(s, OUT_ROW, linear)
+    store_vector(s, OUT_ROW + 3, angular)
     frames = program[_FRAMES]
-    write_rows(m, s, numbers_of(_SIX), 0, 6, to, (b * frames + place) * 6, frames * 6)
+    write_rows(m, s, array_data(_SIX_ROWS), 0, 6, to, (b * frames + place) * 6, frames * 6)
 
 
-def emit_matrix(m, s, program, place, sources, b, reference, state, to):
+def write_matrix(m, s, program, place, sources, b, reference, state, to):
     frames, size = program[_FRAMES], 6 * program[_NV]
     write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
 
@@ -97,74 +105,74 @@ def emit_matrix(m, s, program, place, sources, b, reference, state, to):
 # -- columns ---------------------------------------------------------------------------------------------
 
 
-def store_none(s, row, axis, state):
+def store_no_axis(s, row, axis, state):
     """Do nothing, because this output has no Jacobian columns."""
 
 
-def column_none(s, row, to, how, g, c, reference, state): ...
+def write_no_column(s, row, to, flags, g, c, reference, state): ...
 
 
 def store_axis(s, row, axis, state):
     """Store a joint's axis z_{i-1} and origin O_{i-1} in world axes (7.85)."""
     R, p = state[0], state[1]
     if axis == 2:
-        put_vector(s, row, (R[0][2], R[1][2], R[2][2]))
+        store_vector(s, row, (R[0][2], R[1][2], R[2][2]))
     elif axis == 1:
-        put_vector(s, row, (R[0][1], R[1][1], R[2][1]))
+        store_vector(s, row, (R[0][1], R[1][1], R[2][1]))
     else:
-        put_vector(s, row, (R[0][0], R[1][0], R[2][0]))
-    put_vector(s, row + 3, p)
+        store_vector(s, row, (R[0][0], R[1][0], R[2][0]))
+    store_vector(s, row + 3, p)
 
 
 def store_moving_axis(s, row, axis, state):
     store_axis(s, row, axis, state)
-    put_vector(s, row + 6, state[2])
-    put_vector(s, row + 9, state[3])
+    store_vector(s, row + 6, state[2])
+    store_vector(s, row + 9, state[3])
 
 
-def column_jacobian(s, row, to, how, g, c, reference, state):
+def write_jacobian_column(s, row, to, flags, g, c, reference, state):
     """Compute a Jacobian column: [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85."""
-    z, R = vector(s, row), state[0]
-    if how & 1:
-        d = eq.minus(_end(reference, state[1]), vector(s, row + 3))
+    z, R = load_vector(s, row), state[0]
+    if flags & 1:
+        d = eq.minus(_reference_point(reference, state[1]), load_vector(s, row + 3))
         linear, angular = eq.turning_column(z, d)
-        _put_column(s, to, how, g, c, reference, R, linear, angular)
+        _write_column(s, to, flags, g, c, reference, R, linear, angular)
     else:
-        _put_column(s, to, how, g, c, reference, R, z, _no_vector())
+        _write_column(s, to, flags, g, c, reference, R, z, _zero_vector())
 
 
-def column_rate(s, row, to, how, g, c, reference, state):
+def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
     """Compute the time derivative of a Jacobian column (7.126).
 
     For LOCAL, differentiate the column's components in the moving axes of the frame.
     """
     R, p, w, vel = state[0], state[1], state[2], state[3]
-    z = vector(s, row)
-    z_rate = eq.axis_rate(vector(s, row + 6), z)
-    if how & 1:
-        d = eq.minus(_end(reference, p), vector(s, row + 3))
-        d_rate = eq.minus(_end(reference, vel), vector(s, row + 9))
+    z = load_vector(s, row)
+    z_rate = eq.axis_rate(load_vector(s, row + 6), z)
+    if flags & 1:
+        d = eq.minus(_reference_point(reference, p), load_vector(s, row + 3))
+        d_rate = eq.minus(_reference_point(reference, vel), load_vector(s, row + 9))
         linear, angular = eq.turning_column(z, d)
         rate, turning = eq.turning_column_rate(z, z_rate, d, d_rate)
         if reference == _LOCAL:
             rate = eq.rate_in_turning_axes(rate, w, linear)
             turning = eq.rate_in_turning_axes(turning, w, angular)
-        _put_column(s, to, how, g, c, reference, R, rate, turning)
+        _write_column(s, to, flags, g, c, reference, R, rate, turning)
     else:
         if reference == _LOCAL:
             z_rate = eq.rate_in_turning_axes(z_rate, w, z)
-        _put_column(s, to, how, g, c, reference, R, z_rate, _no_vector())
+        _write_column(s, to, flags, g, c, reference, R, z_rate, _zero_vector())
 
 
-def _end(reference, x):
+def _reference_point(reference, x):
     """Return x, the position or velocity of the frame's origin; for WORLD, return 0."""
     if reference == _WORLD:
-        nil = same(0.0)
+        nil = broadcast(0.0)
         x = nil, nil, nil
     return x
 
 
-def _put_column(s, to, how, g, c, reference, R, linear, angular):
+def _write_column(s, to, flags, g, c, reference, R, linear, angular):
     """Write a Jacobian column in the axes of the reference frame.
 
     The column of a mimic joint is scaled and added to the column of the mimicked joint.
@@ -173,47 +181,47 @@ def _put_column(s, to, how, g, c, reference, R, linear, angular):
         back = eq.transposed(R)
         linear, angular = eq.rotate(back, linear), eq.rotate(back, angular)
     if c:
-        linear = eq.times(constant(g, c), linear)
-        _add_column(s, to, how, linear, eq.times(constant(g, c), angular))
+        linear = eq.times(load_constant(g, c), linear)
+        _add_column(s, to, flags, linear, eq.times(load_constant(g, c), angular))
     else:
-        _add_column(s, to, how, linear, angular)
+        _add_column(s, to, flags, linear, angular)
 
 
-def _add_column(s, to, how, linear, angular):
-    if how & 2:
-        _add_six(s, to, linear, angular)
+def _add_column(s, to, flags, linear, angular):
+    if flags & 2:
+        _add_six_vector(s, to, linear, angular)
     else:
-        put_vector(s, to, linear)
-        put_vector(s, to + 3, angular)
+        store_vector(s, to, linear)
+        store_vector(s, to + 3, angular)
 
 
-def _add_six(s, to, linear, angular):
-    put_vector(s, to, eq.plus(vector(s, to), linear))
-    put_vector(s, to + 3, eq.plus(vector(s, to + 3), angular))
+def _add_six_vector(s, to, linear, angular):
+    store_vector(s, to, eq.plus(load_vector(s, to), linear))
+    store_vector(s, to + 3, eq.plus(load_vector(s, to + 3), angular))
 
 
 # -- pairs of columns ------------------------------------------------------------------------------------
 
 
-def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
+def write_hessian(m, s, program, place, pairs, b, reference, state, to):
     """Write the Hessian (6, nv, nv) of a frame."""
     count, nv = program[pairs], program[_NV]
-    first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
+    first, end = pairs + 1, pairs + 1 + HESSIAN_COLUMN_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
     begin = (b * frames + place) * 6 * size
     for rate in range(nv):
-        for j in range(first, end, PAIR_WIDTH):
-            put_vector(s, program[j + 3], _no_vector())
-            put_vector(s, program[j + 3] + 3, _no_vector())
-        for i in range(first, end, PAIR_WIDTH):
+        for j in range(first, end, HESSIAN_COLUMN_WIDTH):
+            store_vector(s, program[j + 3], _zero_vector())
+            store_vector(s, program[j + 3] + 3, _zero_vector())
+        for i in range(first, end, HESSIAN_COLUMN_WIDTH):
             if program[i + 2] == rate:  # Mimic joints have the same velocity index as the mimicked joint.
-                _add_changes(s, program, i, first, end, reference)
+                _add_column_derivatives(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
             write_rows(m, s, program, end + row * nv, nv, to, at, frames * 6 * size)
 
 
-def _add_changes(s, program, i, first, end, reference):
+def _add_column_derivatives(s, program, i, first, end, reference):
     """Add the derivatives of column i with respect to the motion of each joint.
 
     Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
@@ -222,19 +230,19 @@ def _add_changes(s, program, i, first, end, reference):
     change the column. For LOCAL, an earlier joint moves the column and the frame together. The components of
     the column in the axes of the frame therefore do not change.
     """
-    v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
-    for j in range(first, end, PAIR_WIDTH):
-        v_j, w_j, sum_j = vector(s, program[j]), vector(s, program[j] + 3), program[j + 3]
+    v_i, w_i = load_vector(s, program[i]), load_vector(s, program[i] + 3)
+    for j in range(first, end, HESSIAN_COLUMN_WIDTH):
+        v_j, w_j, sum_j = load_vector(s, program[j]), load_vector(s, program[j] + 3), program[j + 3]
         before = program[j + 1] <= program[i + 1]
         if reference == _ALIGNED:
             if before:
                 linear, angular = eq.turned_along(w_j, v_i, w_i)
-                _add_six(s, sum_j, linear, angular)
+                _add_six_vector(s, sum_j, linear, angular)
             else:
-                _add_six(s, sum_j, eq.end_moved(w_i, v_j), _no_vector())
+                _add_six_vector(s, sum_j, eq.end_moved(w_i, v_j), _zero_vector())
         elif reference == _WORLD and before:
             linear, angular = eq.motion_product(v_j, w_j, v_i, w_i)
-            _add_six(s, sum_j, linear, angular)
+            _add_six_vector(s, sum_j, linear, angular)
         elif reference == _LOCAL and not before:
             linear, angular = eq.motion_product(v_i, w_i, v_j, w_j)
-            _add_six(s, sum_j, linear, angular)
+            _add_six_vector(s, sum_j, linear, angular)

@@ -31,8 +31,8 @@ class StepField(IntEnum):
 
 
 class JointMotion(IntEnum):
-    TURN = 0
-    SLIDE = 1
+    REVOLUTE = 0
+    PRISMATIC = 1
     PLANAR = 2
     FLOATING = 3
 
@@ -52,22 +52,22 @@ class Geometry(IntEnum):
 class ColumnField(IntEnum):
     STEP = 0
     AXIS = 1
-    TURNS = 2
+    IS_ROTATION = 2
     V = 3
 
 
 _MOTION = {
-    JointKind.REVOLUTE: JointMotion.TURN,
-    JointKind.CONTINUOUS: JointMotion.TURN,
-    JointKind.PRISMATIC: JointMotion.SLIDE,
+    JointKind.REVOLUTE: JointMotion.REVOLUTE,
+    JointKind.CONTINUOUS: JointMotion.REVOLUTE,
+    JointKind.PRISMATIC: JointMotion.PRISMATIC,
     JointKind.PLANAR: JointMotion.PLANAR,
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
 #: Motions of each kind of joint: the index of the axis in the joint's frame, and True for a rotation.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
-    JointMotion.TURN: ((2, True),),
-    JointMotion.SLIDE: ((2, False),),
+    JointMotion.REVOLUTE: ((2, True),),
+    JointMotion.PRISMATIC: ((2, False),),
     JointMotion.PLANAR: ((0, False), (1, False), (2, True)),
     JointMotion.FLOATING: ((0, False), (1, False), (2, False), (0, True), (1, True), (2, True)),
 }
@@ -93,7 +93,7 @@ class CompiledTree:
         leaders: (frames, columns) index of the sum column of each Jacobian column; -1 if the column's joint
             does not move the frame. The columns of a joint and of its mimic joints are added in one sum
             column. The sum column is the first of these columns on the path to the frame.
-        places_q: Indices of the coordinates that the recursion needs.
+        q_indices: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints. The first
             elements sum the offsets between the previous moving joint and each moving joint. The other
@@ -113,7 +113,7 @@ class CompiledTree:
     columns: IntArray
     multipliers: FloatArray
     leaders: IntArray
-    places_q: tuple[int, ...]
+    q_indices: tuple[int, ...]
     parents: IntArray
     lengths: FloatArray
     depth: IntArray
@@ -138,8 +138,8 @@ class CompiledTree:
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
-    def turns_only(self) -> bool:
-        return bool((self.steps[:, StepField.KIND] == JointMotion.TURN).all())
+    def all_revolute(self) -> bool:
+        return bool((self.steps[:, StepField.KIND] == JointMotion.REVOLUTE).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
@@ -171,11 +171,11 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         frames=np.array(
             [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
         ).reshape(-1, 2),
-        offsets=np.array([_flat(end.T) for end in ends]).reshape(-1, 12),
+        offsets=np.array([_flatten_pose(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
         leaders=leaders[order],
-        places_q=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
+        q_indices=tuple(at + c for at, i in places for c in range(tree.joints[i].kind.nq)),
         parents=np.array(parents, dtype=np.int64),
         lengths=np.array(
             [anchors[tree.joints[i].parent].length + tree.joints[i].length for i in needed]
@@ -188,14 +188,14 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
     """Return the number of joints from the root to each link on the paths to `links`."""
-    met = {0}
+    visited = {0}
     for end in links:
         link = end
-        while link not in met:
-            met.add(link)
+        while link not in visited:
+            visited.add(link)
             link = tree.joints[link - 1].parent
     depths = {0: 0}
-    for link in sorted(met - {0}):
+    for link in sorted(visited - {0}):
         depths[link] = depths[tree.joints[link - 1].parent] + 1
     return depths
 
@@ -208,12 +208,12 @@ class _Anchor(NamedTuple):
     length: float
 
 
-def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterable[int]) -> dict[int, _Anchor]:
+def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], joints: Iterable[int]) -> dict[int, _Anchor]:
     anchors = {0: _Anchor(-1, np.eye(4), 0.0)}
-    for i in wanted:
+    for i in joints:
         joint = tree.joints[i]
         if i in step_of_joint:
-            anchors[i + 1] = _Anchor(step_of_joint[i], turned(joint).T, 0.0)
+            anchors[i + 1] = _Anchor(step_of_joint[i], axis_pose(joint).T, 0.0)
         else:
             parent = anchors[joint.parent]
             anchors[i + 1] = _Anchor(
@@ -222,12 +222,12 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
     return anchors
 
 
-def turned(joint: Joint) -> FloatArray:
+def axis_pose(joint: Joint) -> FloatArray:
     """Return the pose (4, 4) that rotates the z axis to the joint's axis."""
     return pose(rotation_with_z_axis(joint.axis) if joint.kind.has_axis else None)
 
 
-def _flat(T: FloatArray) -> FloatArray:
+def _flatten_pose(T: FloatArray) -> FloatArray:
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -238,11 +238,11 @@ def _steps(
     geometry = np.zeros((len(needed), Geometry.CONSTANT + 1))
     for row, i in enumerate(needed):
         joint = tree.joints[i]
-        T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)
+        T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ axis_pose(joint)
         steps[row, StepField.KIND] = _MOTION[joint.kind]
         steps[row, StepField.Q] = tree.q_index[i]
         steps[row, StepField.V] = tree.v_index[i]
-        geometry[row, : Geometry.MULTIPLIER] = _flat(T_step_joint)
+        geometry[row, : Geometry.MULTIPLIER] = _flatten_pose(T_step_joint)
         rule = joint.mimic
         geometry[row, Geometry.MULTIPLIER :] = (1.0, 0.0) if rule is None else (rule.multiplier, rule.offset)
     return steps, geometry
@@ -279,32 +279,32 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 class Op(IntEnum):
     """Instructions of a program.
 
-    CARRY is a constant translation in any direction, and TURN is a constant rotation about any axis. The
-    suffix X, Y or Z names a coordinate axis; these instructions are faster. STORE stores the data that the
-    Jacobian column of a joint needs.
+    TRANSLATE is a constant translation in any direction, and ROTATE is a constant rotation about any axis.
+    The suffix X, Y or Z names a coordinate axis; these instructions are faster. STORE_AXIS stores the data
+    that the Jacobian column of a joint needs.
     """
 
     END = 0
-    CARRY_X = 1
-    CARRY_Y = 2
-    CARRY_Z = 3
-    CARRY = 4
-    TURN_X = 5
-    TURN_Y = 6
-    TURN_Z = 7
-    TURN = 8
+    TRANSLATE_X = 1
+    TRANSLATE_Y = 2
+    TRANSLATE_Z = 3
+    TRANSLATE = 4
+    ROTATE_X = 5
+    ROTATE_Y = 6
+    ROTATE_Z = 7
+    ROTATE = 8
     REVOLUTE = 9
     PRISMATIC = 10
     PLANAR = 11
     FLOATING = 12
     SAVE = 13
-    RESUME = 14
-    STORE = 15
+    RESTORE = 14
+    STORE_AXIS = 15
     COLUMN = 16
-    EMIT = 17
+    WRITE = 17
 
 
-class Head(IntEnum):
+class ProgramHeader(IntEnum):
     """Indices of the integers at the beginning of a program, before the instructions.
 
     CODE is the index of the first instruction. BLOCKS_Q, BLOCKS_V and BLOCKS_END delimit the lists of blocks
@@ -331,20 +331,20 @@ class Head(IntEnum):
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
 #: Number of integers for an instruction: the operation, three operands, and the index of its constants.
-WIDTH = 5
+INSTRUCTION_WIDTH = 5
 #: Number of integers that describe a joint angle in a program: the scratch row of the angle, the scratch row
 #: of the sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
-STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
+STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Number of integers for one Jacobian column in a Hessian. The integers are the scratch row of the column,
 #: the joint's row in `steps`, the joint's index in v, and the scratch row of the running sum.
-PAIR_WIDTH = 4
+HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
-    JointMotion.TURN: Op.REVOLUTE,
-    JointMotion.SLIDE: Op.PRISMATIC,
+    JointMotion.REVOLUTE: Op.REVOLUTE,
+    JointMotion.PRISMATIC: Op.PRISMATIC,
     JointMotion.PLANAR: Op.PLANAR,
     JointMotion.FLOATING: Op.FLOATING,
 }
@@ -354,8 +354,8 @@ _JOINTS = {
 class KernelProgram:
     """A program for a kernel.
 
-    `words` has three parts: the integers that `Head` names, the lists, and the instructions. `rows` is the
-    number of rows of scratch memory that the program needs.
+    `words` has three parts: the integers that `ProgramHeader` names, the lists, and the instructions. `rows`
+    is the number of rows of scratch memory that the program needs.
     """
 
     words: IntArray
@@ -373,25 +373,25 @@ class KernelProgram:
         return words, list(map(Number, self.constants.tolist()))
 
 
-def program_of(
-    plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False
+def compile_program(
+    plan: CompiledTree, *, orientations: bool, columns: bool = False, hessian: bool = False
 ) -> KernelProgram:
     """Return the program for the frames of a compiled tree; the tree stores the program.
 
-    If `turned` is true, the program also computes the orientation of each frame. Placements need the
-    orientation, and so do results in the frame's own axes. If `pairs` is true, mimic joints have separate
+    If `orientations` is true, the program also computes the orientation of each frame. Placements need the
+    orientation, and so do results in the frame's own axes. If `hessian` is true, mimic joints have separate
     Jacobian columns, as a Hessian requires.
     """
-    key = turned, columns, pairs
+    key = orientations, columns, hessian
     program: KernelProgram | None = plan.cache.get(key)
     if program is None:
-        program = plan.cache[key] = _Writer(plan, *key).program()
+        program = plan.cache[key] = _ProgramWriter(plan, *key).program()
     return program
 
 
-class _Writer:
-    def __init__(self, plan: CompiledTree, turned: bool, columns: bool, pairs: bool) -> None:
-        self.plan, self.turned, self.columns, self.pairs = plan, turned, columns, pairs
+class _ProgramWriter:
+    def __init__(self, plan: CompiledTree, orientations: bool, columns: bool, hessian: bool) -> None:
+        self.plan, self.orientations, self.columns, self.hessian = plan, orientations, columns, hessian
         self.code: list[tuple[int, int, int, int, int]] = []
         self.constants: list[float] = [0.0]
         self.slots: dict[int, int] = {}
@@ -400,22 +400,26 @@ class _Writer:
         self.a = self.v + plan.nv
         self.base = self.a + plan.nv
         self.sines = self.base + STATE_ROWS
-        self.stored = self.sines + 2 * len(plan.steps)
-        self.results = self.stored + STORED_ROWS * len(plan.columns) * columns
-        self.sums = self.results + COLUMN_ROWS * len(plan.columns) * columns
-        self.saved = self.sums + COLUMN_ROWS * len(plan.columns) * pairs
-        self.rules = [self._rule(i) for i in range(len(plan.steps))]
-        parts = _blocks(plan.places_q), _blocks(plan.columns[:, ColumnField.V].tolist()), self._angles()
+        self.axis_rows = self.sines + 2 * len(plan.steps)
+        self.column_rows = self.axis_rows + AXIS_ROWS * len(plan.columns) * columns
+        self.sums = self.column_rows + COLUMN_ROWS * len(plan.columns) * columns
+        self.state_rows = self.sums + COLUMN_ROWS * len(plan.columns) * hessian
+        self.rules = [self._add_mimic_rule(i) for i in range(len(plan.steps))]
+        parts = (
+            _block_starts(plan.q_indices),
+            _block_starts(plan.columns[:, ColumnField.V].tolist()),
+            self._angle_entries(),
+        )
         self.lists = [number for part in parts for number in part]
-        begins = np.cumsum([len(Head), *map(len, parts)]).tolist()
+        begins = np.cumsum([len(ProgramHeader), *map(len, parts)]).tolist()
         lists = [*begins[:3], begins[2], begins[3]]
         self.head = [0, plan.nq, plan.nv, len(plan.frames), *lists, self.q, self.v, self.a, self.base]
 
     def program(self) -> KernelProgram:
         self._write()
-        self._put(Op.END)
-        rows = self.saved + STATE_ROWS * len(self.slots)
-        self.head[Head.CODE] = len(self.head) + len(self.lists)
+        self._add_instruction(Op.END)
+        rows = self.state_rows + STATE_ROWS * len(self.slots)
+        self.head[ProgramHeader.CODE] = len(self.head) + len(self.lists)
         words = [*self.head, *self.lists, *(word for line in self.code for word in line)]
         return KernelProgram(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
@@ -424,18 +428,20 @@ class _Writer:
         columns = self.plan.columns if self.columns else self.plan.columns[:0]
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
-        self._save(-1, last, 0)
+        self._save_if_reused(-1, last, 0)
         for k, (origin, step, frame) in enumerate(events):
             if now != origin:
-                self._put(Op.RESUME, self._slot(origin))
+                self._add_instruction(Op.RESTORE, self._state_row(origin))
             if step is not None:
-                self._step(step)
+                self._add_joint(step)
                 now = step
                 while c < len(columns) and columns[c, ColumnField.STEP] == step:
-                    self._put(Op.STORE, self.stored + STORED_ROWS * c, int(columns[c, ColumnField.AXIS]))
+                    self._add_instruction(
+                        Op.STORE_AXIS, self.axis_rows + AXIS_ROWS * c, int(columns[c, ColumnField.AXIS])
+                    )
                     c += 1
-                self._save(step, last, k + 1)
-            elif frame is not None and self._frame(frame):
+                self._save_if_reused(step, last, k + 1)
+            elif frame is not None and self._add_frame(frame):
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
@@ -452,43 +458,45 @@ class _Writer:
                 yield i, None, f
                 f += 1
 
-    def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
+    def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
         """Save the state after a joint if an event later than event `following` begins with this state."""
         if last.get(step, -1) > following:
-            self._put(Op.SAVE, self._slot(step))
+            self._add_instruction(Op.SAVE, self._state_row(step))
 
-    def _slot(self, step: int) -> int:
-        return self.saved + STATE_ROWS * self.slots.setdefault(step, len(self.slots))
+    def _state_row(self, step: int) -> int:
+        return self.state_rows + STATE_ROWS * self.slots.setdefault(step, len(self.slots))
 
-    def _put(self, op: Op, *operands: int, at: int = 0) -> None:
+    def _add_instruction(self, op: Op, *operands: int, at: int = 0) -> None:
         x, y, z = (*operands, 0, 0, 0)[:3]
         self.code.append((int(op), x, y, z, at))
 
-    def _constants(self, *numbers: float) -> int:
+    def _add_constants(self, *numbers: float) -> int:
         self.constants += map(float, numbers)
         return len(self.constants) - len(numbers)
 
-    def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
+    def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
         """Add the instructions for a translation by p and a rotation by R; return whether any was added."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
-            op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY
-            self._put(Op(op), at=self._constants(*p))
-        if turned and (np.eye(3) != R).any():
+            op = Op.TRANSLATE_X + along[0] if len(along) == 1 else Op.TRANSLATE
+            self._add_instruction(Op(op), at=self._add_constants(*p))
+        if orientations and (np.eye(3) != R).any():
             about = [axis for axis in range(3) if _is_rotation_about(R, axis)]
-            self._put(Op(Op.TURN_X + about[0]) if about else Op.TURN, at=self._constants(*R.ravel()))
+            self._add_instruction(
+                Op(Op.ROTATE_X + about[0]) if about else Op.ROTATE, at=self._add_constants(*R.ravel())
+            )
         return len(self.code) > before
 
-    def _rule(self, i: int) -> int:
+    def _add_mimic_rule(self, i: int) -> int:
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
-        return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
+        return 0 if (multiplier, constant) == (1.0, 0.0) else self._add_constants(multiplier, constant)
 
-    def _angles(self) -> list[int]:
+    def _angle_entries(self) -> list[int]:
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = JointMotion(step[StepField.KIND]), self.q + int(step[StepField.Q])
-            if kind in (JointMotion.TURN, JointMotion.PLANAR):
+            if kind in (JointMotion.REVOLUTE, JointMotion.PLANAR):
                 angles += [
                     q + 2 * (kind is JointMotion.PLANAR),
                     self.sines + 2 * i,
@@ -497,39 +505,41 @@ class _Writer:
                 ]
         return angles
 
-    def _step(self, i: int) -> None:
+    def _add_joint(self, i: int) -> None:
         geometry, step = self.plan.geometry[i], self.plan.steps[i]
-        self._rigid(geometry[:9].reshape(3, 3), geometry[Geometry.OFFSET : Geometry.MULTIPLIER])
+        self._add_transform(geometry[:9].reshape(3, 3), geometry[Geometry.OFFSET : Geometry.MULTIPLIER])
         op, rule, sine = _JOINTS[JointMotion(step[StepField.KIND])], self.rules[i], self.sines + 2 * i
         first = sine if op is Op.REVOLUTE else self.q + int(step[StepField.Q])
-        self._put(op, first, int(step[StepField.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
+        self._add_instruction(
+            op, first, int(step[StepField.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule
+        )
 
-    def _frame(self, f: int) -> bool:
+    def _add_frame(self, f: int) -> bool:
         """Add the instructions for a frame's results.
 
         Return whether the instructions overwrite the state of the last moving joint.
         """
         plan, offsets = self.plan, self.plan.offsets[f]
-        moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
+        moved = self._add_transform(offsets[:9].reshape(3, 3), offsets[9:], orientations=self.orientations)
         sources = 0
         if self.columns:
-            self._columns(f)
+            self._add_columns(f)
             sources = len(self.head) + len(self.lists)
-            self.lists += self._pairs(f) if self.pairs else self._sources(f, self.results)
-        self._put(Op.EMIT, int(plan.frames[f, 1]), sources)
+            self.lists += self._hessian_entries(f) if self.hessian else self._result_rows(f, self.column_rows)
+        self._add_instruction(Op.WRITE, int(plan.frames[f, 1]), sources)
         return moved
 
-    def _columns(self, f: int) -> None:
+    def _add_columns(self, f: int) -> None:
         for c, leader in enumerate(self.plan.leaders[f].tolist()):
             if leader >= 0:
                 multiplier = float(self.plan.multipliers[c])
-                follows = 0 if multiplier == 1.0 else self._constants(multiplier)
-                to = c if self.pairs else leader
-                how = int(self.plan.columns[c, ColumnField.TURNS]) + 2 * (to != c)
-                rows = self.stored + STORED_ROWS * c, self.results + COLUMN_ROWS * to
-                self._put(Op.COLUMN, *rows, how, at=follows)
+                multiplier_index = 0 if multiplier == 1.0 else self._add_constants(multiplier)
+                to = c if self.hessian else leader
+                flags = int(self.plan.columns[c, ColumnField.IS_ROTATION]) + 2 * (to != c)
+                rows = self.axis_rows + AXIS_ROWS * c, self.column_rows + COLUMN_ROWS * to
+                self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
-    def _sources(self, f: int, row: int) -> list[int]:
+    def _result_rows(self, f: int, row: int) -> list[int]:
         """Return the scratch row of each element of the frame's (6, nv) matrix.
 
         The six numbers of Jacobian column c begin at the scratch row `row + COLUMN_ROWS * c`.
@@ -540,19 +550,19 @@ class _Writer:
             sources[:, plan.columns[c, ColumnField.V]] = row + COLUMN_ROWS * c + np.arange(6)
         return sources.ravel().tolist()
 
-    def _pairs(self, f: int) -> list[int]:
+    def _hessian_entries(self, f: int) -> list[int]:
         """Return the integers that the Hessian of a frame needs.
 
-        The integers are the number of columns, then `PAIR_WIDTH` integers for each column, and then the
-        scratch rows of the result.
+        The integers are the number of columns, then `HESSIAN_COLUMN_WIDTH` integers for each column, and then
+        the scratch rows of the result.
         """
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
-        rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
+        rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
         pairs = np.column_stack(
             (rows[0], columns[own, ColumnField.STEP], columns[own, ColumnField.V], rows[1])
         )
-        return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
+        return [len(own), *pairs.ravel().tolist(), *self._result_rows(f, self.sums)]
 
 
 def _is_rotation_about(R: FloatArray, axis: int) -> bool:
@@ -560,13 +570,13 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())
 
 
-def _blocks(places: Sequence[int]) -> list[int]:
+def _block_starts(indices: Sequence[int]) -> list[int]:
     """Return the first index of each block of eight that contains one of the given indices."""
-    return sorted({int(place) // 8 * 8 for place in places})
+    return sorted({int(index) // 8 * 8 for index in indices})
 
 
 #: Number of bytes in a cache line; access to a vector in two cache lines takes twice as long.
-_LINE = 64
+_CACHE_LINE = 64
 #: The integer of each reference frame in a kernel; any other frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
@@ -574,7 +584,7 @@ REFERENCES = {
 
 
 class KernelArgs(IntEnum):
-    """Indices of a kernel's arguments; CORE and later arguments belong to calls with one configuration."""
+    """Indices of a kernel's arguments; KERNEL and later arguments belong to calls with one configuration."""
 
     PROGRAM = 0
     CONSTANTS = auto()
@@ -593,11 +603,11 @@ class KernelArgs(IntEnum):
     STRIDE_BASE = auto()
     OUT = auto()
     #: Number of output numbers for one configuration.
-    WIDTH = auto()
+    OUTPUT_WIDTH = auto()
     #: Address of the buffer that collects a block's results before they are written; 0 without a buffer.
-    STAGE = auto()
+    BUFFER = auto()
 
-    CORE = auto()
+    KERNEL = auto()
     NQ = auto()
     NV = auto()
     ORDERS = auto()
@@ -613,12 +623,12 @@ def address(x: NDArray[Any]) -> int:
     return first
 
 
-def scratch(program: KernelProgram) -> FloatArray:
-    return lines(program.rows * LANES)
+def make_scratch(program: KernelProgram) -> FloatArray:
+    return aligned_empty(program.rows * LANES)
 
 
-def lines(count: int) -> FloatArray:
+def aligned_empty(count: int) -> FloatArray:
     """Return an uninitialized array of `count` numbers, aligned to a cache line."""
-    numbers = np.empty(count + _LINE // 8)
-    first = -address(numbers) % _LINE // 8
+    numbers = np.empty(count + _CACHE_LINE // 8)
+    first = -address(numbers) % _CACHE_LINE // 8
     return numbers[first : first + count]

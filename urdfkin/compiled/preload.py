@@ -6,11 +6,11 @@ computations.
 
 | time without a kernel | action |
 |---|---|
-| more than `LOADING` | read the kernel from disk |
-| more than `BESIDE`, no kernel on disk | compile the kernel in a second process; Python still computes |
-| more than `COMPILING`, no kernel on disk | compile the kernel in this process |
+| more than `LOAD_AFTER` | read the kernel from disk |
+| more than `BACKGROUND_AFTER`, no kernel on disk | compile it in a second process; Python still computes |
+| more than `COMPILE_AFTER`, no kernel on disk | compile it in this process |
 
-If no second process can compile the kernel, this process compiles it after the time `BESIDE`.
+If no second process can compile the kernel, this process compiles it after the time `BACKGROUND_AFTER`.
 """
 
 from __future__ import annotations
@@ -24,153 +24,156 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.compiled.kernel_cache import cache_folder, compiling
-from urdfkin.system.locks import importing
+from urdfkin.compiled.kernel_cache import compile_lock, kernel_cache_folder
+from urdfkin.system.locks import import_lock
 
 if TYPE_CHECKING:
     import subprocess
 
 #: Computing times (s) without a kernel; the table above lists the action that follows each time.
-LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
-#: This threshold (s) applies instead of `LOADING` after the first kernel is loaded.
-_LOADING_MORE = 0.03
+LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
+#: This threshold (s) applies instead of `LOAD_AFTER` after the first kernel is loaded.
+_LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
-_SAVED = 5e-5
+_SECONDS_SAVED = 5e-5
 #: Time (s) after which the cache folder is searched again for a missing kernel.
-_AGAIN = 0.05
+_SEARCH_INTERVAL = 0.05
 
-RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
+KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 #: Two groups of kernels with about equal compile times; each of two processes compiles one group.
-_ONE_HALF = "accelerations", "local_accelerations", "velocities"
-_OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
+_FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
+_SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
 #: How to compute: "interpreted" with Python numbers, or "compiled" with kernels.
-Way = Literal["interpreted", "compiled"]
+ComputeMode = Literal["interpreted", "compiled"]
 
-_spent: dict[str, float] = {}
-_loaded: dict[str, Any] = {}
-_absent: dict[tuple[Path, str], float] = {}
-_only: list[Way] = []
+_seconds_spent: dict[str, float] = {}
+_kernels: dict[str, Any] = {}
+_next_search: dict[tuple[Path, str], float] = {}
+_modes: list[ComputeMode] = []
 
 
 @contextmanager
-def only(way: Way) -> Iterator[None]:
+def use_only(mode: ComputeMode) -> Iterator[None]:
     """While the context is open, use only Python numbers ("interpreted") or only kernels ("compiled")."""
-    _only.append(way)
+    _modes.append(mode)
     try:
         yield
     finally:
-        _only.pop()
+        _modes.pop()
 
 
-def spend(name: str, seconds: float) -> None:
+def add_time(name: str, seconds: float) -> None:
     """Add the seconds of a computation that did not use the kernel `name`."""
-    _spent[name] = _spent.get(name, 0.0) + seconds
+    _seconds_spent[name] = _seconds_spent.get(name, 0.0) + seconds
 
 
-def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
+def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_MODULE) -> Any:
     """Return a kernel, or None if computing without the kernel is faster.
 
-    `more` is the estimated time (seconds) of the next computations without the kernel.
+    `expected_seconds` is the estimated time (seconds) of the next computations without the kernel.
     """
-    if _only and _only[-1] == "interpreted":
+    if _modes and _modes[-1] == "interpreted":
         return None
-    if (found := _loaded.get(name)) is not None:
-        return found
-    if _only:
-        return load(name, home)
-    seconds = _spent.get(name, 0.0) + more
-    if seconds < (_LOADING_MORE if _loaded else LOADING):
+    if (kernel := _kernels.get(name)) is not None:
+        return kernel
+    if _modes:
+        return load_kernel(name, module)
+    seconds = _seconds_spent.get(name, 0.0) + expected_seconds
+    if seconds < (_LOAD_NEXT_AFTER if _kernels else LOAD_AFTER):
         return None
-    if seconds < COMPILING and not _on_disk(name) and (seconds < BESIDE or _compile_beside(name, home)):
+    if (
+        seconds < COMPILE_AFTER
+        and not _is_on_disk(name)
+        and (seconds < BACKGROUND_AFTER or _compile_in_background(name, module))
+    ):
         return None
-    return load(name, home)
+    return load_kernel(name, module)
 
 
-def single_pays(name: str) -> bool:
+def should_load_single(name: str) -> bool:
     """Return whether to load the function that computes one configuration with the kernel `name`.
 
-    If the kernel is loaded, each call adds `_SAVED` seconds to the time lost without this function.
+    If the kernel is loaded, each call adds `_SECONDS_SAVED` seconds to the time lost without this function.
     """
-    if _only:
-        return _only[-1] == "compiled"
-    if name not in _loaded and f"local_{name}" not in _loaded:
+    if _modes:
+        return _modes[-1] == "compiled"
+    if name not in _kernels and f"local_{name}" not in _kernels:
         return False
-    spend("one_configuration", _SAVED)
-    more = COMPILING if cache_folder() is None else LOADING
-    return kernel("one_configuration", more, SINGLE) is not None
+    add_time("one_configuration", _SECONDS_SAVED)
+    expected_seconds = COMPILE_AFTER if kernel_cache_folder() is None else LOAD_AFTER
+    return get_kernel("one_configuration", expected_seconds, SINGLE_MODULE) is not None
 
 
-def load(name: str, home: str = RECURSIONS) -> Any:
-    with compiling, importing:
-        found = getattr(import_module(home), name)
-    _ = found.compiled
-    _loaded[name] = found
-    return found
+def load_kernel(name: str, module: str = KERNELS_MODULE) -> Any:
+    with compile_lock, import_lock:
+        kernel = getattr(import_module(module), name)
+    _ = kernel.compiled_function
+    _kernels[name] = kernel
+    return kernel
 
 
-def _on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk; search again only after `_AGAIN` seconds."""
-    folder = cache_folder()
-    if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
+def _is_on_disk(name: str) -> bool:
+    """Return whether a kernel is on disk; search again only after `_SEARCH_INTERVAL` seconds."""
+    folder = kernel_cache_folder()
+    if folder is None or time.monotonic() < _next_search.get((folder, name), 0.0):
         return False
-    found = any(folder.glob(f"*.{name}.*.kernel"))
-    if not found:
-        _absent[folder, name] = time.monotonic() + _AGAIN
-    return found
+    exists = any(folder.glob(f"*.{name}.*.kernel"))
+    if not exists:
+        _next_search[folder, name] = time.monotonic() + _SEARCH_INTERVAL
+    return exists
 
 
 # -- the second process ----------------------------------------------------------------------------------
 
 #: Code that ends the second process when its standard input closes, that is, when this process ends.
-_UNTIL_CLOSED = (
+_EXIT_WITH_PARENT = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
 )
-_beside: dict[str, subprocess.Popen[bytes]] = {}
+_background: dict[str, subprocess.Popen[bytes]] = {}
 
 
-def _compile_beside(name: str, home: str) -> bool:
+def _compile_in_background(name: str, module: str) -> bool:
     """Start a second process that compiles a kernel.
 
     Return False if the caller must load or compile the kernel itself, and True otherwise. At most one second
     process runs at a time, and at most one is started for each kernel.
     """
-    if cache_folder() is None:
+    if kernel_cache_folder() is None:
         return False
-    if not compiling.acquire(blocking=False):
+    if not compile_lock.acquire(blocking=False):
         return True  # Another thread compiles a kernel, or starts the second process.
     try:
-        if any(process.poll() is None for process in _beside.values()):
+        if any(process.poll() is None for process in _background.values()):
             return True
-        if name in _beside:
+        if name in _background:
             return False
-        _beside[name] = _compile_elsewhere((name,), home)
+        _background[name] = _start_compiler((name,), module)
         return True
     finally:
-        compiling.release()
+        compile_lock.release()
 
 
-def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
+def _start_compiler(names: Sequence[str], module: str = KERNELS_MODULE) -> subprocess.Popen[bytes]:
     import subprocess
 
-    from urdfkin.system.processes import own_python
+    from urdfkin.system.processes import python_command
 
-    code = (
-        f"{_UNTIL_CLOSED} from urdfkin.compiled import preload; preload._compile({tuple(names)!r}, {home!r})"
-    )
+    load = f"preload._load_group({tuple(names)!r}, {module!r})"
+    code = f"{_EXIT_WITH_PARENT} from urdfkin.compiled import preload; {load}"
     return subprocess.Popen(
-        own_python(code),
+        python_command(code),
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
 
 
-def _end_beside() -> None:
-    for process in _beside.values():
+def _kill_background() -> None:
+    for process in _background.values():
         process.kill()
         process.wait()
         _close(process)
@@ -181,38 +184,38 @@ def _close(process: subprocess.Popen[bytes]) -> None:
         process.stdin.close()
 
 
-def _forget_beside() -> None:
+def _close_inherited_inputs() -> None:
     """Close the second process's standard input in a forked child, so that only the parent keeps it open."""
-    for process in _beside.values():
+    for process in _background.values():
         process.returncode = 0
         _close(process)
-    _beside.clear()
+    _background.clear()
 
 
-atexit.register(_end_beside)
-os.register_at_fork(after_in_child=_forget_beside)
+atexit.register(_kill_background)
+os.register_at_fork(after_in_child=_close_inherited_inputs)
 
 
 # -- all kernels in advance ------------------------------------------------------------------------------
 
 
-def are_on_disk() -> bool:
-    return all(map(_on_disk, _ONE_HALF + _OTHER_HALF))
+def all_kernels_on_disk() -> bool:
+    return all(map(_is_on_disk, _FIRST_GROUP + _SECOND_GROUP))
 
 
-def load_kernels() -> None:
+def load_all_kernels() -> None:
     """Load every kernel before several processes start, so that not every process compiles all kernels."""
-    missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
-    helper = _compile_elsewhere(_OTHER_HALF) if missing else None
+    missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_GROUP))
+    compiler = _start_compiler(_SECOND_GROUP) if missing else None
     try:
-        _compile(_ONE_HALF)
+        _load_group(_FIRST_GROUP)
     finally:
-        if helper is not None:
-            helper.wait()
-            _close(helper)
-    _compile(_OTHER_HALF)
+        if compiler is not None:
+            compiler.wait()
+            _close(compiler)
+    _load_group(_SECOND_GROUP)
 
 
-def _compile(names: Sequence[str], home: str = RECURSIONS) -> None:
+def _load_group(names: Sequence[str], module: str = KERNELS_MODULE) -> None:
     for name in names:
-        load(name, home)
+        load_kernel(name, module)

@@ -12,16 +12,16 @@ from typing import Any, Protocol
 import numpy as np
 
 from urdfkin.compiled import preload
-from urdfkin.compiled.kernel_cache import compiling
+from urdfkin.compiled.kernel_cache import compile_lock
 from urdfkin.compiled.plan import CompiledTree, KernelArgs
 from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.locks import importing
+from urdfkin.system.locks import import_lock
 
 #: A function f(q, out), f(q, v, out) or f(q, v, a, out) that returns None for unsupported arguments.
-Fast = Callable[..., FloatArray | None]
+FastFunction = Callable[..., FloatArray | None]
 
 
 class _PreparedRobot(Protocol):
@@ -67,8 +67,17 @@ class PreparedFrame:
     """
 
     __slots__ = (
-        "_acceleration", "_hessian", "_jacobian", "_placement", "_plan", "_robot", "_velocity", "frame",
-        "reference", "verify", "wanted",
+        "_acceleration",
+        "_hessian",
+        "_jacobian",
+        "_placement",
+        "_plan",
+        "_robot",
+        "_velocity",
+        "always_load",
+        "frame",
+        "reference",
+        "verify",
     )  # fmt: skip
 
     def __init__(
@@ -83,13 +92,13 @@ class PreparedFrame:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
         #: Whether `Robot.prepare` created this object. If so, the first call loads or compiles machine code.
-        self.wanted = False
-        # `_first` replaces each of these attributes when `_first` creates the quantity's compiled function.
-        self._placement: Fast = partial(self._first, "placement")
-        self._velocity: Fast = partial(self._first, "velocity")
-        self._jacobian: Fast = partial(self._first, "jacobian")
-        self._hessian: Fast = partial(self._first, "hessian")
-        self._acceleration: Fast = partial(self._first, "acceleration")
+        self.always_load = False
+        # When `_compute_first` creates a quantity's function, it replaces the attribute by the function.
+        self._placement: FastFunction = partial(self._compute_first, "placement")
+        self._velocity: FastFunction = partial(self._compute_first, "velocity")
+        self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
+        self._hessian: FastFunction = partial(self._compute_first, "hessian")
+        self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
         # The object contains addresses of this process, so unpickling calls `Robot.prepare`.
@@ -163,7 +172,7 @@ class PreparedFrame:
             q, v, a, self.frame, self.reference, out=out, verify=self.verify, threads=1
         )
 
-    def _first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
+    def _compute_first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
         """Create a quantity's fast function and call the fast function.
 
         Return None if the fast function cannot be used, saves no time, or returns None.
@@ -172,20 +181,20 @@ class PreparedFrame:
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large
         if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None
-        if not self.wanted and not preload.single_pays(f"{quantity}s"):
+        if not self.always_load and not preload.should_load_single(f"{quantity}s"):
             return None
-        with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, single
+        with compile_lock, import_lock:
+            from urdfkin.compiled.machine.single import array_layout_is_known, make_single_evaluator
 
-        if not arrays_are_known():
+        if not array_layout_is_known():
             return None
-        compute, task = single(quantity, self._plan, self.reference)
+        compute, args = make_single_evaluator(quantity, self._plan, self.reference)
         verifier = self._robot.verifier
         if self.verify:
             compute = verifier.with_check(quantity, compute, self._plan, self.frame, self.reference)
         else:
-            verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
+            verifier.ledger.account(quantity).counters.append((args, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
-        if (found := compute(q, *others)) is not None and not self.verify:
+        if (result := compute(q, *others)) is not None and not self.verify:
             warn_of_degrees(self._robot.tree, q)  # Later calls skip this check.
-        return found
+        return result

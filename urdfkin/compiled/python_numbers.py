@@ -71,7 +71,7 @@ class Number:
         kind = type(other)
         if kind is Number:
             return Product(self.x, other.x)
-        if kind is Known:
+        if kind is ConstantNumber:
             return other if other.value != 1 else self
         return Product(self.x, _double(other))
 
@@ -84,7 +84,7 @@ class Number:
             return Number(fma(other.x, other.y, self.x))
         if kind is Number:
             return Number(self.x + other.x)
-        if kind is Known and not other.value:
+        if kind is ConstantNumber and not other.value:
             return self if other.value == 0 else other
         return Number(self.x + _double(other))
 
@@ -94,7 +94,7 @@ class Number:
             return Number(fma(-other.x, other.y, self.x))
         if kind is Number:
             return Number(self.x - other.x)
-        if kind is Known and not other.value:
+        if kind is ConstantNumber and not other.value:
             return self if other.value == 0 else other
         return Number(self.x - _double(other))
 
@@ -114,7 +114,7 @@ class Product:
         self.x, self.y = x, y
 
     def __mul__(self, other: Any) -> Any:
-        if type(other) is Known:
+        if type(other) is ConstantNumber:
             return other if other.value != 1 else self
         return Product(self.x * self.y, _double(other))
 
@@ -125,7 +125,7 @@ class Product:
         kind = type(other)
         if kind is Product:
             return Number(fma(other.x, other.y, self.x * self.y))
-        if kind is Known and not other.value:
+        if kind is ConstantNumber and not other.value:
             return self if other.value == 0 else other
         return Number(fma(self.x, self.y, _double(other)))
 
@@ -133,7 +133,7 @@ class Product:
         kind = type(other)
         if kind is Product:
             return Number(fma(-other.x, other.y, self.x * self.y))
-        if kind is Known and not other.value:
+        if kind is ConstantNumber and not other.value:
             return self if other.value == 0 else other
         return Number(fma(self.x, self.y, -_double(other)))
 
@@ -144,8 +144,8 @@ class Product:
         return Product(-self.x, self.y)
 
 
-class Known:
-    """The constant 0 or 1; the value None is the placeholder `nothing()`."""
+class ConstantNumber:
+    """The constant 0 or 1; the value None is the placeholder `unused()`."""
 
     __slots__ = ("value",)
 
@@ -153,7 +153,7 @@ class Known:
         self.value = value
 
     def __mul__(self, other: Any) -> Any:
-        if self.value == 1 or (type(other) is Known and other.value is None):
+        if self.value == 1 or (type(other) is ConstantNumber and other.value is None):
             return other
         return self
 
@@ -161,46 +161,46 @@ class Known:
         return self if self.value != 1 else other
 
     def __add__(self, other: Any) -> Any:
-        if self.value is None or (type(other) is Known and not other.value):
+        if self.value is None or (type(other) is ConstantNumber and not other.value):
             return self if self.value is None or other.value == 0 else other
         return other if self.value == 0 else Number(1.0) + other
 
     def __sub__(self, other: Any) -> Any:
-        if self.value is None or (type(other) is Known and not other.value):
+        if self.value is None or (type(other) is ConstantNumber and not other.value):
             return self if self.value is None or other.value == 0 else other
         return -other if self.value == 0 else Number(1.0) - other
 
     def __rsub__(self, other: int) -> Any:
         return other if self.value == 0 else Number(float(other)) - self
 
-    def __neg__(self) -> Known:
+    def __neg__(self) -> ConstantNumber:
         return self
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float; the number must not be `nothing()`."""
+    """Return a number as a float; the number must not be `unused()`."""
     if type(x) is Product:
         return x.x * x.y
-    return x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
+    return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)
 
 
-_ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
+_ZERO, _ONE, _UNUSED = ConstantNumber(0), ConstantNumber(1), ConstantNumber(None)
 
 
-def zero() -> Known:
+def zero() -> ConstantNumber:
     return _ZERO
 
 
-def one() -> Known:
+def one() -> ConstantNumber:
     return _ONE
 
 
-def nothing() -> Known:
+def unused() -> ConstantNumber:
     """Return the placeholder for a number that no output needs."""
-    return _NOTHING
+    return _UNUSED
 
 
-def rounded(x: Any) -> Any:
+def round_product(x: Any) -> Any:
     """Multiply the factors of a product and round the result; return other numbers unchanged."""
     return Number(x.x * x.y) if type(x) is Product else x
 
@@ -208,36 +208,36 @@ def rounded(x: Any) -> Any:
 # -- memory ----------------------------------------------------------------------------------------------
 
 
-def number(s: Sequence[Number], row: int) -> Number:
+def load_number(s: Sequence[Number], row: int) -> Number:
     return s[row]
 
 
-def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    return wanted if wanted is _NOTHING else s[row]
+def load_number_if(marker: Any, s: Sequence[Number], row: int) -> Any:
+    return marker if marker is _UNUSED else s[row]
 
 
-def put(s: list[Number], row: int, x: Any) -> None:
-    if x is not _NOTHING:
+def store_number(s: list[Number], row: int, x: Any) -> None:
+    if x is not _UNUSED:
         s[row] = x if type(x) is Number else Number(_double(x))
 
 
-def constant(g: Sequence[Number], i: int) -> Number:
+def load_constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-same = Number  # Compiled code copies one double to all configurations of a block.
+broadcast = Number  # Compiled code copies one double to all configurations of a block.
 
 
-def numbers_of(array: Any) -> Any:
+def array_data(array: Any) -> Any:
     return array.tolist()
 
 
-def numbers_at(address: Any) -> Any:
+def doubles_at(address: Any) -> Any:
     """Return the list `address`; the function of this name in compiled code returns a pointer."""
     return address
 
 
-whole_numbers_at = numbers_at
+integers_at = doubles_at
 
 
 def read_rows(
@@ -256,15 +256,15 @@ def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Numbe
     return Number(total.x + sum(y * y for y in x[at : at + count]))
 
 
-def ordinary(total: Number) -> bool:
+def is_in_range(total: Number) -> bool:
     return total.x < LARGE * LARGE
 
 
-def all_written(*_: object) -> None:
+def wait_for_writes(*_: object) -> None:
     """Do nothing; the function of this name in compiled code waits until all results are in memory."""
 
 
-stream = all_written
+stream = wait_for_writes
 
 
 # -- sine and cosine -------------------------------------------------------------------------------------
@@ -278,15 +278,15 @@ def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
     n = fma(x, _2_PI, NO_FRACTION) - NO_FRACTION
     near = fma(n, -PI_2, x)
     r = fma(n, -PI_2_REST, near)
-    lost = fma(n, -PI_2_REST, near - r)
+    r_error = fma(n, -PI_2_REST, near - r)
     z = r * r
-    z_lost = fma(r, r, -z)
-    most = fma(z, -0.5, 1.0)
-    most_lost = fma(z, -0.5, 1.0 - most)
-    sine = r + fma(r * z, _polynomial(z, SINE), lost * most)
-    rest = fma(z * z, _polynomial(z, COSINE), most_lost)
-    rest = fma(z_lost, -0.5, rest)
-    cosine = most + fma(-r, lost, rest)
+    z_error = fma(r, r, -z)
+    leading = fma(z, -0.5, 1.0)
+    leading_error = fma(z, -0.5, 1.0 - leading)
+    sine = r + fma(r * z, _polynomial(z, SINE), r_error * leading)
+    rest = fma(z * z, _polynomial(z, COSINE), leading_error)
+    rest = fma(z_error, -0.5, rest)
+    cosine = leading + fma(-r, r_error, rest)
     quarters = int(n)
     pair = (cosine, sine) if quarters & 1 else (sine, cosine)
     return (

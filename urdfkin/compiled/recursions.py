@@ -10,62 +10,76 @@ instead of addresses. The result is 1 if an input is nan, infinite or too large,
 from __future__ import annotations
 
 from urdfkin.compiled.outputs import (
-    column_jacobian,
-    column_none,
-    column_rate,
-    emit_acceleration,
-    emit_imu,
-    emit_matrix,
-    emit_pairs,
-    emit_place,
-    emit_velocity,
-    mask_acceleration,
-    mask_place,
-    mask_velocity,
+    mask_for_acceleration,
+    mask_for_placement,
+    mask_for_velocity,
     store_axis,
     store_moving_axis,
-    store_none,
+    store_no_axis,
+    write_acceleration,
+    write_hessian,
+    write_imu,
+    write_jacobian_column,
+    write_jacobian_rate_column,
+    write_matrix,
+    write_no_column,
+    write_placement,
+    write_velocity,
 )
 from urdfkin.compiled.recursion import forward_recursion, link_axes, world_axes
 
 
-def placements(task):
-    return forward_recursion(task, world_axes, 1, mask_place, store_none, column_none, emit_place)
-
-
-def velocities(task):
-    return forward_recursion(task, world_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
-
-
-def local_velocities(task):
-    return forward_recursion(task, link_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
-
-
-def accelerations(task):
+def placements(args):
     return forward_recursion(
-        task, world_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
+        args, world_axes, 1, mask_for_placement, store_no_axis, write_no_column, write_placement
     )
 
 
-def local_accelerations(task):
+def velocities(args):
     return forward_recursion(
-        task, link_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
+        args, world_axes, 2, mask_for_velocity, store_no_axis, write_no_column, write_velocity
     )
 
 
-def jacobians(task):
-    return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_matrix)
+def local_velocities(args):
+    return forward_recursion(
+        args, link_axes, 2, mask_for_velocity, store_no_axis, write_no_column, write_velocity
+    )
 
 
-def jacobian_rates(task):
-    return forward_recursion(task, world_axes, 2, mask_velocity, store_moving_axis, column_rate, emit_matrix)
+def accelerations(args):
+    return forward_recursion(
+        args, world_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_acceleration
+    )
 
 
-def hessians(task):
+def local_accelerations(args):
+    return forward_recursion(
+        args, link_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_acceleration
+    )
+
+
+def jacobians(args):
+    return forward_recursion(
+        args, world_axes, 1, mask_for_placement, store_axis, write_jacobian_column, write_matrix
+    )
+
+
+def jacobian_rates(args):
+    return forward_recursion(
+        args, world_axes, 2, mask_for_velocity, store_moving_axis, write_jacobian_rate_column, write_matrix
+    )
+
+
+def hessians(args):
     """Compute the derivative of each Jacobian column with respect to each joint's motion."""
-    return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_pairs)
+    return forward_recursion(
+        args, world_axes, 1, mask_for_placement, store_axis, write_jacobian_column, write_hessian
+    )
 
 
-def imus(task):
+def imus(args):
     """Compute accelerometer and gyroscope readings in each frame's own axes."""
-    return forward_recursion(task, link_axes, 3, mask_acceleration, store_none, column_none, emit_imu)
+    return forward_recursion(
+        args, link_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_imu
+    )

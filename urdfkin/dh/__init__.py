@@ -2,11 +2,11 @@
 
 from urdfkin.dh.convert import to_convention, to_tree, to_urdf
 from urdfkin.dh.export import FORMATS, export
-from urdfkin.dh.make import dh_table
+from urdfkin.dh.make import make_dh_table
 from urdfkin.dh.parse_table import read_table
 from urdfkin.dh.rows import table_from_mapping, table_from_rows
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, SnapChange, SnapReport
-from urdfkin.dh.units import Units, units_of
+from urdfkin.dh.units import Units, parse_units
 
 __all__ = [
     "FORMATS",
@@ -16,13 +16,13 @@ __all__ = [
     "SnapChange",
     "SnapReport",
     "Units",
-    "dh_table",
     "export",
+    "make_dh_table",
+    "parse_units",
     "read_table",
     "table_from_mapping",
     "table_from_rows",
     "to_convention",
     "to_tree",
     "to_urdf",
-    "units_of",
 ]

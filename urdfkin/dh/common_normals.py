@@ -1,7 +1,7 @@
 """Compute the transform between two consecutive joint axes, along their common normal if it is unique.
 
 The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
-this joint's frame. `step_between` writes A as a product:
+this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
@@ -11,9 +11,9 @@ joint's row. For skew axes, beta is 0, and the other six numbers are unique exce
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. `steps_like` copies these numbers from a reference table, except for one
-row. For this row, `steps_like` chooses the d or the theta that makes the sum correct. In a Hayati row, d can
-also be chosen freely, because the two axes do not determine d.
+angles theta about coinciding axes. `match_axis_transforms` copies these numbers from a reference table,
+except for one row. For this row, `match_axis_transforms` chooses the d or the theta that makes the sum
+correct. In a Hayati row, d can also be chosen freely, because the two axes do not determine d.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.table import DHRow, DHTable, angle_difference, between_axes, cleaned_angle
+from urdfkin.dh.table import DHRow, DHTable, angle_difference, clean_angle, link_transform
 from urdfkin.errors import RangeError
 from urdfkin.kinematics.roundings import (
     ANGLE_ROUNDINGS,
@@ -42,7 +42,7 @@ from urdfkin.model.tree import FloatArray, Joint
 NEARLY_PARALLEL = 1e-2
 
 #: Axes with a larger tilt (rad) never get a Hayati row, even if their common normal is far away.
-LARGEST_HAYATI_TILT = 0.35
+MAX_HAYATI_TILT = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,75 +70,77 @@ class AxisTransform:
         )
 
 
-def shifted_along_z(A: FloatArray, distance: float) -> FloatArray:
+def shift_along_z(A: FloatArray, distance: float) -> FloatArray:
     shifted = A.copy()
     shifted[2, 3] += distance
     return shifted
 
 
-def step_between(
+def find_axis_transform(
     A: FloatArray,
     reach: float,
-    phi_free: float = 0.0,
+    default_phi: float = 0.0,
     *,
     hayati: bool,
-    delta_each: bool = False,
+    offset_in_delta: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
     """Factor the (4, 4) pose A of the next joint's frame in this joint's frame.
 
-    `reach` is the length of the path (m). If the axes do not determine phi, phi is `phi_free`. The offset
-    along parallel axes is in `delta` if `delta_each` is true, otherwise in `delta_next`. Tilts and lengths
-    within `noise` are set to zero.
+    `reach` is the length of the path (m). If the axes do not determine phi, phi is `default_phi`. The offset
+    along parallel axes is in `delta` if `offset_in_delta` is true, otherwise in `delta_next`. Tilts and
+    lengths within `noise` are set to zero.
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
-    sine = tilt_of(A)
+    sine = tilt_sine(A)
     if sine <= noise.radians:
-        return _parallel(A, reach, noise, phi_free, delta_each)
-    step = _along_common_normal(A, sine, reach, noise)
+        return _find_parallel_transform(A, reach, noise, default_phi, offset_in_delta)
+    step = _find_normal_transform(A, sine, reach, noise)
     is_far = max(abs(step.delta), abs(step.delta_next)) > reach
-    is_near_parallel = sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and is_far)
+    is_near_parallel = sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT and is_far)
     if hayati and is_near_parallel:
-        return hayati_step(A, reach, noise, phi_free)
+        return find_hayati_transform(A, reach, noise, default_phi)
     return step
 
 
-def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
+def _find_normal_transform(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
-    delta_next = cleaned_length(-across / sine, reach, noise.metres)
-    delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
-    a, alpha = cleaned_length(along, reach, noise.metres), cleaned_angle(math.atan2(sine, A[2, 2]))
+    delta_next = clean_length(-across / sine, reach, noise.metres)
+    delta = clean_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
+    a, alpha = clean_length(along, reach, noise.metres), clean_angle(math.atan2(sine, A[2, 2]))
     step = AxisTransform(phi, delta, a, alpha, 0.0, _phi_next(A, phi, alpha, 0.0), delta_next)
     return step.with_reversed_x() if a < 0.0 else step
 
 
-def _parallel(
-    A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float, delta_each: bool
+def _find_parallel_transform(
+    A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float, offset_in_delta: bool
 ) -> AxisTransform:
     """Return the transform between parallel axes, along a common normal through one joint's origin."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
-    offset = cleaned_length(A[2, 3], reach, noise.metres)
-    delta, delta_next = (offset, 0.0) if delta_each else (0.0, sign * offset)
-    a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
-    phi = math.atan2(A[1, 3], A[0, 3]) if a else phi_free
+    offset = clean_length(A[2, 3], reach, noise.metres)
+    delta, delta_next = (offset, 0.0) if offset_in_delta else (0.0, sign * offset)
+    a = clean_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
+    phi = math.atan2(A[1, 3], A[0, 3]) if a else default_phi
     phi_next = _phi_next(A, phi, alpha, 0.0)
     return AxisTransform(phi, delta, a, alpha, 0.0, phi_next, delta_next, phi_is_free=not a)
 
 
-def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float) -> AxisTransform:
+def find_hayati_transform(
+    A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
+) -> AxisTransform:
     """Return the transform for a Hayati row; x points to the next axis's intersection with the xy plane."""
     z = A[:3, 2]
-    delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
+    delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
-    a = cleaned_length(math.hypot(across[0], across[1]), reach, noise.metres)
-    phi = math.atan2(across[1], across[0]) if a else phi_free
+    a = clean_length(math.hypot(across[0], across[1]), reach, noise.metres)
+    phi = math.atan2(across[1], across[0]) if a else default_phi
     x = math.cos(phi) * z[0] + math.sin(phi) * z[1]
     y = math.cos(phi) * z[1] - math.sin(phi) * z[0]
-    alpha = cleaned_angle(math.atan2(-y, z[2]))
-    beta = cleaned_angle(math.atan2(x, math.hypot(y, z[2])))
+    alpha = clean_angle(math.atan2(-y, z[2]))
+    beta = clean_angle(math.atan2(x, math.hypot(y, z[2])))
     phi_next = _phi_next(A, phi, alpha, beta)
     return AxisTransform(phi, 0.0, a, alpha, beta, phi_next, delta_next, phi_is_free=not a)
 
@@ -146,14 +148,14 @@ def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: flo
 def _phi_next(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
     """Return phi_next (rad) of the pose A; the formula is accurate for every tilt."""
     Rz = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
-    M = (Rz @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
+    M = (Rz @ link_transform(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
-def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
+def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Remove rounding errors from a length (m) that was computed from lengths of up to `reach`.
 
-    >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
+    >>> clean_length(-5e-17, 1.0), clean_length(0.07599999999999998, 1.0), clean_length(-5e-12, 1.0)
     (0.0, 0.076, -5e-12)
     """
     if abs(length) <= max(LENGTH_ROUNDINGS * EPS * reach, noise):
@@ -182,20 +184,20 @@ class PairWithReference:
     @property
     def offset_is_free(self) -> bool:
         """Whether d of the row can be chosen freely; the next row can then compensate for d."""
-        return tilt_of(self.A) <= self.noise.radians or self._has_hayati_row
+        return tilt_sine(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
     def _has_hayati_row(self) -> bool:
-        sine = tilt_of(self.A)
+        sine = tilt_sine(self.A)
         reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.hayati and (
-            sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and not reference_is_strict)
+            sine < NEARLY_PARALLEL or (sine < MAX_HAYATI_TILT and not reference_is_strict)
         )
 
     @property
     def normal_offset(self) -> float:
         """Distance (m) along the first axis from its joint's frame to the common normal."""
-        return step_between(self.A, self.reach, hayati=False, noise=self.noise).delta
+        return find_axis_transform(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
@@ -208,7 +210,7 @@ class PairWithReference:
         it would exceed `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
-        sine, reference_tilt = tilt_of(self.A), math.hypot(along, across)
+        sine, reference_tilt = tilt_sine(self.A), math.hypot(along, across)
         if min(sine, reference_tilt) <= self.noise.radians:
             return None
         (x, y, z), p = self.A[:3, 2] / sine, self.A[:3, 3]
@@ -220,57 +222,59 @@ class PairWithReference:
         offset = float(p[2] + (a_along_tilt - p[0] * x - p[1] * y) * z)
         return offset if abs(offset) <= self.reach else None
 
-    def step(self, carry: float, d: float, phi_free: float = 0.0) -> AxisTransform:
+    def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
         """Return the transform between the two axes.
 
-        `carry` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
+        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
         offset for the row (m); it is ignored if the two axes determine the offset.
         """
         if not self.offset_is_free:
-            A = shifted_along_z(self.A, carry)
-            return step_between(A, self.reach, phi_free, hayati=False, noise=self.noise)
-        A = shifted_along_z(self.A, carry - d)
-        if tilt_of(A) <= self.noise.radians:
-            step = step_between(A, self.reach, phi_free, hayati=self.hayati, noise=self.noise)
+            A = shift_along_z(self.A, delta_in)
+            return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
+        A = shift_along_z(self.A, delta_in - d)
+        if tilt_sine(A) <= self.noise.radians:
+            step = find_axis_transform(A, self.reach, default_phi, hayati=self.hayati, noise=self.noise)
         else:
-            step = hayati_step(A, self.reach, self.noise, phi_free)
+            step = find_hayati_transform(A, self.reach, self.noise, default_phi)
         return replace(step, delta=step.delta + d) if d else step
 
-    def offset_before(self, carry: float) -> float:
+    def offset_before(self, delta_next: float) -> float:
         """Return the offset (m) along the first axis from the DH frame to the joint's frame, for d = 0.
 
-        `carry` is the same offset along the second axis, for the next joint.
+        `delta_next` is the same offset along the second axis, for the next joint.
         """
-        return float(carry * self.A[2, 2] - self.A[2, 3])
+        return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
 
-def steps_like(
-    pairs: Sequence[PairWithReference], phi_in: float, carry: float, tip: float | None
+def match_axis_transforms(
+    pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between the axes, and theta of each row, as close to a reference as possible.
 
-    `phi_in` is the angle (rad) about the first axis from frame 0 to the first joint's frame. `carry` is the
-    offset (m) along the first axis between these frames. `tip` is the offset (m) along the last axis from the
-    DH frame to the joint's frame. With this offset, d of the last row equals the reference. If `tip` is None,
-    d of the last row may differ from the reference.
+    `phi_in` is the angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is
+    the offset (m) along the first axis between these frames. `tip_offset` is the offset (m) along the last
+    axis from the DH frame to the joint's frame. With this offset, d of the last row equals the reference. If
+    `tip_offset` is None, d of the last row may differ from the reference.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
-        inputs.append((carry, _free_offset(pairs, i, carry, tip)))
-        steps.append(pair.step(*inputs[-1]))
-        carry = steps[-1].delta_next
+        inputs.append((delta_in, _choose_offset(pairs, i, delta_in, tip_offset)))
+        steps.append(pair.find_transform(*inputs[-1]))
+        delta_in = steps[-1].delta_next
     thetas = []
     for i, pair in enumerate(pairs):
         if steps[i].phi_is_free:
-            steps[i] = pair.step(*inputs[i], _free_phi(pairs, steps, i, phi_in))
+            steps[i] = pair.find_transform(*inputs[i], _choose_phi(pairs, steps, i, phi_in))
         else:
-            steps[i] = _closer_direction(steps[i], pair, phi_in)
-        thetas.append(theta_like(phi_in + steps[i].phi, pair.row.theta))
+            steps[i] = _choose_direction(steps[i], pair, phi_in)
+        thetas.append(match_theta(phi_in + steps[i].phi, pair.row.theta))
         phi_in = steps[i].phi_next
     return steps, thetas
 
 
-def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: float | None) -> float:
+def _choose_offset(
+    pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None
+) -> float:
     """Return the reference's d, or the d for which another cell of the table equals the reference.
 
     The other cell is d of a later row, or a of a Hayati row.
@@ -281,25 +285,25 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
     end = i + 1
     while end < len(pairs) and pairs[end].offset_is_free and not pairs[end].is_prismatic:
         end += 1
-    target = tip
+    target = tip_offset
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
         # If a row from i to end - 1 is a Hayati row, d is chosen so that a of this row equals the reference.
-        end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
+        end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
             return pair.row.d
         if end == i:
-            return cleaned_length(carry + hayati_offset, pair.reach, pair.noise.metres)
+            return clean_length(delta_in + hayati_offset, pair.reach, pair.noise.metres)
         target = pairs[end].row.d - hayati_offset
     for later in reversed(pairs[i + 1 : end]):
         target = later.row.d + later.offset_before(target)
-    return cleaned_length(carry - pair.offset_before(target), pair.reach, pair.noise.metres)
+    return clean_length(delta_in - pair.offset_before(target), pair.reach, pair.noise.metres)
 
 
-def _free_phi(
+def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
     """Return the phi that gives the reference's theta in this row, or in the next prismatic rows."""
@@ -311,14 +315,14 @@ def _free_phi(
         end += 1
     if end == len(pairs) or not pairs[end].is_prismatic:
         return own
-    phi = _closer_direction(steps[end], pairs[end]).phi
+    phi = _choose_direction(steps[end], pairs[end]).phi
     for k in range(end - 1, i - 1, -1):
         into = pairs[k + 1].row.theta - phi
         phi = math.copysign(1.0, math.cos(steps[k].alpha)) * (steps[k].phi_next - into)
     return phi
 
 
-def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
+def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
     """Choose the direction of x that gives cells closer to the reference."""
     row = pair.row
 
@@ -330,17 +334,15 @@ def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
     return min((step, step.with_reversed_x()), key=difference)
 
 
-def theta_like(theta: float, reference: float) -> float:
+def match_theta(theta: float, reference: float) -> float:
     """Return the reference if the two angles differ only by rounding; otherwise theta."""
     return (
-        reference
-        if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS
-        else cleaned_angle(theta)
+        reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )
 
 
 #: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
-LONGEST = 1e150
+MAX_LENGTH = 1e150
 
 
 def check_lengths(joints: Iterable[Joint]) -> None:
@@ -359,7 +361,7 @@ def check_lengths_of_table(chain: FrameChain, table: DHTable) -> None:
 
 
 def _check_length(where: str, length: float) -> None:
-    if length > LONGEST:
+    if length > MAX_LENGTH:
         raise RangeError(
             "the square of this length is outside the range of double precision",
             where=where,
@@ -399,17 +401,17 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
     ]
 
 
-def left_out(chain: FrameChain) -> float:
+def sum_zeroed_tilts(chain: FrameChain) -> float:
     """Return the sum (rad) of the tilts that a table sets to zero as rounding errors.
 
     The orientation error that these tilts cause is at most this sum.
     """
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
-        total += sum(tilt for tilt in (tilt_of(A), abs(float(A[2, 0]))) if tilt <= noise.radians)
+        total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)
     return total
 
 
-def tilt_of(A: FloatArray) -> float:
+def tilt_sine(A: FloatArray) -> float:
     """Return the sine of the angle between the z axis of a pose and the z axis of its reference frame."""
     return math.hypot(A[0, 2], A[1, 2])

@@ -32,12 +32,12 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
     """Return the table in the convention "standard" or "modified"."""
-    wanted = convention_of(convention)
-    if wanted is table.convention or not table.rows:
-        return replace(table, convention=wanted)
+    target = convention_of(convention)
+    if target is table.convention or not table.rows:
+        return replace(table, convention=target)
     rows = table.rows
     steps = [(row.a, row.alpha, row.beta) for row in rows]
-    if wanted is DHConvention.MODIFIED:
+    if target is DHConvention.MODIFIED:
         first = as_a_and_alpha(table.base)
         steps = [(*(first or (0.0, 0.0)), 0.0), *steps[:-1]]
         base, tool = np.eye(4) if first else table.base, rows[-1].X @ table.tool
@@ -48,11 +48,11 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     rows = tuple(
         replace(row, a=a, alpha=alpha, beta=beta) for row, (a, alpha, beta) in zip(rows, steps, strict=True)
     )
-    return replace(table, convention=wanted, rows=rows, base=base, tool=tool)
+    return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
 #: URDF requires limits of prismatic joints, so a joint without limits gets these (m, m/s and N).
-UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
+DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
@@ -62,15 +62,17 @@ def to_tree(table: DHTable) -> KinematicTree:
     coordinates as the table. A revolute joint without limits becomes continuous.
     """
     links = link_names(table)
-    joints = _serial_joints(table, [(_kind(row), _limit(row), row.mimic) for row in table.rows])
+    joints = _serial_joints(table, [(_tree_kind(row), _tree_limit(row), row.mimic) for row in table.rows])
     triples = list(zip(joints, links, links[1:], strict=False))
     names = {row.joint for row in table.rows}
     for leader in table.joint_names:
         if leader not in names:
             turns = next(row.kind.turns for row in table.rows if row.mimic and row.mimic.leader == leader)
-            kind, limit = (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, UNBOUNDED_SLIDE)
+            kind, limit = (
+                (JointKind.CONTINUOUS, None) if turns else (JointKind.PRISMATIC, DEFAULT_PRISMATIC_LIMIT)
+            )
             joint = Joint(leader, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit)
-            triples.append((joint, links[0], _new(f"{leader}_link", links)))
+            triples.append((joint, links[0], _make_unique(f"{leader}_link", links)))
     return build_tree(table.robot, links[0], triples)
 
 
@@ -79,14 +81,14 @@ def to_urdf(table: DHTable) -> str:
     return write_urdf(to_tree(table))
 
 
-def free_tree(table: DHTable) -> KinematicTree:
+def to_free_tree(table: DHTable) -> KinematicTree:
     """Return the tree without limits and mimic rules: each row has its own coordinate, in row order."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
-    return serial_tree(table.robot, link_names(table), joints)
+    return make_serial_tree(table.robot, link_names(table), joints)
 
 
-def serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> KinematicTree:
+def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> KinematicTree:
     """Return a tree without branches; joint i connects links i and i + 1."""
     return build_tree(robot, links[0], list(zip(joints, links, links[1:], strict=False)))
 
@@ -99,7 +101,7 @@ def _serial_joints(
         Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
         for row, T, (kind, limit, mimic) in zip(table.rows, poses, details, strict=True)
     ]
-    name = _new(f"{table.tip_frame}_fixed", [*(row.joint for row in table.rows), *table.joint_names])
+    name = _make_unique(f"{table.tip_frame}_fixed", [*(row.joint for row in table.rows), *table.joint_names])
     return [*joints, Joint(name, JointKind.FIXED, 0, T_tip, np.array([1.0, 0.0, 0.0]))]
 
 
@@ -116,22 +118,22 @@ def frame_poses(table: DHTable) -> list[FloatArray]:
 
 def link_names(table: DHTable) -> list[str]:
     names = [table.base_frame]
-    names += [_new(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]
-    return [*names, _new(table.tip_frame, names)]
+    names += [_make_unique(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]
+    return [*names, _make_unique(table.tip_frame, names)]
 
 
-def _new(name: str, taken: list[str]) -> str:
+def _make_unique(name: str, taken: list[str]) -> str:
     while name in taken:
         name += "_"
     return name
 
 
-def _kind(row: DHRow) -> JointKind:
+def _tree_kind(row: DHRow) -> JointKind:
     unbounded = row.kind is JointKind.REVOLUTE and not is_bounded(row.limit)
     return JointKind.CONTINUOUS if unbounded else row.kind
 
 
-def _limit(row: DHRow) -> Limit | None:
+def _tree_limit(row: DHRow) -> Limit | None:
     if is_bounded(row.limit) or row.kind is JointKind.CONTINUOUS:
         return row.limit
-    return None if row.kind.turns else UNBOUNDED_SLIDE
+    return None if row.kind.turns else DEFAULT_PRISMATIC_LIMIT

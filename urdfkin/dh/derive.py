@@ -1,6 +1,7 @@
 """Derive a Denavit-Hartenberg table from a chain of axes, in one pass from base to tip.
 
-Free choices are made as in docs/dh.md, unless `Choices` or a reference table specifies other choices.
+Free choices are made as in docs/dh.md, unless `DerivationOptions` or a reference table specifies other
+choices.
 """
 
 from __future__ import annotations
@@ -16,24 +17,24 @@ from urdfkin.dh.common_normals import (
     AxisTransform,
     PairWithReference,
     PoseTolerance,
-    cleaned_length,
+    clean_length,
+    find_axis_transform,
+    match_axis_transforms,
+    match_theta,
     pose_tolerances,
-    shifted_along_z,
-    step_between,
-    steps_like,
-    theta_like,
-    tilt_of,
+    shift_along_z,
+    tilt_sine,
 )
 from urdfkin.dh.table import (
     DHConvention,
     DHRow,
     DHTable,
-    along_axis,
     angle_difference,
     as_a_and_alpha,
-    between_axes,
-    cleaned_angle,
+    clean_angle,
     is_identity,
+    joint_transform,
+    link_transform,
 )
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
@@ -41,7 +42,7 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
 #: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
-RIGHT_ANGLE_SLACK = 1e-3
+RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {
     "near_parallel": ("hayati", "strict"),
@@ -54,8 +55,8 @@ _OPTIONS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Choices:
-    """The options of a derivation; `urdfkin.dh.make.dh_table` explains them."""
+class DerivationOptions:
+    """The options of a derivation; `urdfkin.dh.make.make_dh_table` explains them."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -77,53 +78,55 @@ class Choices:
         return self.near_parallel == "hayati"
 
 
-def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
+def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
-    `like` is a standard table of the same joints; its frames have priority over `choices`.
+    `like` is a standard table of the same joints; its frames have priority over `options`.
     """
-    constants = _reversed_axes(chain, choices.flip)
+    constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
     if not chain.joints:
-        return _table(chain, choices, [], [], constants[0], np.eye(4))
+        return _make_table(chain, options, [], [], constants[0], np.eye(4))
     first, *between, end = pose_tolerances(chain, reach)
-    _place_prismatic_axes(chain, constants, choices, reach)
-    base, phi_in, carry = _frame_zero(constants[0], reach, first)
+    _place_prismatic_axes(chain, constants, options, reach)
+    base, phi_in, delta_in = _find_frame_zero(constants[0], reach, first)
     if like is None:
-        steps, thetas = _steps(constants[1:-1], phi_in, carry, reach, choices, between)
+        steps, thetas = _find_transforms(constants[1:-1], phi_in, delta_in, reach, options, between)
     else:
         pairs = [
-            PairWithReference(A, row, reach, noise, choices.hayati)
+            PairWithReference(A, row, reach, noise, options.hayati)
             for A, row, noise in zip(constants[1:-1], like.rows[:-1], between, strict=True)
         ]
-        tip = _offset_for_last_row(like, constants[-1], choices, end)
-        steps, thetas = steps_like(pairs, phi_in, carry, tip)
+        tip = _offset_for_last_row(like, constants[-1], options, end)
+        steps, thetas = match_axis_transforms(pairs, phi_in, delta_in, tip)
     if steps:
-        phi_in, carry = steps[-1].phi_next, steps[-1].delta_next
+        phi_in, delta_in = steps[-1].phi_next, steps[-1].delta_next
     rows = [(theta, step.delta) for theta, step in zip(thetas, steps, strict=True)]
-    theta, d, last, tool = _last(shifted_along_z(constants[-1], carry), phi_in, carry, reach, choices, end)
+    theta, d, last, tool = _make_last_row(
+        shift_along_z(constants[-1], delta_in), phi_in, delta_in, reach, options, end
+    )
     if like is not None:
-        theta, d, last, tool = _last_like(like, theta, d, last, tool)
+        theta, d, last, tool = _match_last_row(like, theta, d, last, tool)
     rows.append((theta, d))
     if like is not None:
-        base, rows[0] = _first_like(like.rows[0], base, rows[0])
-    if choices.parallel_offset == "first":
+        base, rows[0] = _match_first_row(like.rows[0], base, rows[0])
+    if options.parallel_offset == "first":
         rows = _sum_offsets_in_first_row(rows, steps)
-    if choices.first == "joint":
-        base, rows[0] = base @ along_axis(*rows[0]), (0.0, 0.0)
+    if options.first == "joint":
+        base, rows[0] = base @ joint_transform(*rows[0]), (0.0, 0.0)
         _clean_rotation(base)
-    return _table(chain, choices, rows, [*steps, last], base, tool)
+    return _make_table(chain, options, rows, [*steps, last], base, tool)
 
 
-def _table(
+def _make_table(
     chain: FrameChain,
-    choices: Choices,
+    options: DerivationOptions,
     theta_and_d: list[tuple[float, float]],
     steps: list[AxisTransform],
     base: FloatArray,
     tool: FloatArray,
 ) -> DHTable:
-    if choices.convention is DHConvention.MODIFIED and steps:
+    if options.convention is DHConvention.MODIFIED and steps:
         if first := as_a_and_alpha(base):
             base = np.eye(4)
         a, alpha = first or (0.0, 0.0)
@@ -132,15 +135,15 @@ def _table(
     for joint, (own_theta, own_d), step in zip(chain.joints, theta_and_d, steps, strict=True):
         # Adding 0.0 converts -0.0 to 0.0.
         a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, own_d, own_theta, step.beta))
-        sense = -1 if joint.name in choices.flip else 1
+        sense = -1 if joint.name in options.flip else 1
         rows.append(DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
-    return DHTable(choices.convention, tuple(rows), base, tool, chain.robot, chain.base, chain.tip)
+    return DHTable(options.convention, tuple(rows), base, tool, chain.robot, chain.base, chain.tip)
 
 
 # -- before the pass -----------------------------------------------------------------------------------
 
 
-def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
+def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
     """Return the constant poses, with the z axes of the joints `flip` reversed."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -152,23 +155,23 @@ def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]
 
 
 def _place_prismatic_axes(
-    chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
+    chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
     """Shift the axes of prismatic joints; such a joint defines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
     shifted = set[int]()
-    if choices.slide == "minimal":
+    if options.slide == "minimal":
         shifted |= {k for k in prismatic if _shift_to_revolute_joint(constants, k, is_prismatic)}
-    if not choices.hayati:
+    if not options.hayati:
         shifted |= {k for k in prismatic if k not in shifted and _shift_to_parallel_axis(constants, k, noise)}
     if 0 in prismatic and 0 not in shifted:
         _shift_to_previous_origin(constants, 0)
         shifted.add(0)
     last, tip = len(is_prismatic) - 1, constants[-1]
-    shift_avoids_tool = choices.last == "tip" and abs(tip[2, 0]) <= noise[-1].radians
-    has_tool = not _representable(tip, choices, noise[-1])
+    shift_avoids_tool = options.last == "tip" and abs(tip[2, 0]) <= noise[-1].radians
+    has_tool = not _fits_last_row(tip, options, noise[-1])
     if last in prismatic and last not in shifted and shift_avoids_tool and has_tool:
         _shift(constants, last, np.array([tip[0, 3], tip[1, 3], 0.0]))
 
@@ -186,10 +189,10 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
     """Shift the axis of joint k so that its common normal with a nearly parallel axis is near the robot."""
-    if k > 0 and noise[k].radians < tilt_of(constants[k]) < NEARLY_PARALLEL:
+    if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
-    if k + 2 < len(noise) and noise[k + 1].radians < tilt_of(constants[k + 1]) < NEARLY_PARALLEL:
+    if k + 2 < len(noise) and noise[k + 1].radians < tilt_sine(constants[k + 1]) < NEARLY_PARALLEL:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
     return False
@@ -209,13 +212,13 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 # -- the pass ------------------------------------------------------------------------------------------
 
 
-def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
+def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
     """Return T_base_0, and the angle about z_0 and the offset along z_0 from frame 0 to joint 1."""
     z, p = A[:3, 2], A[:3, 3]
-    offset = cleaned_length(float(z @ p), reach, noise.metres)
+    offset = clean_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = p - offset * z
-    if tilt_of(A) <= noise.radians:
+    if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # x is e - (e . z) z for the base's x axis e. This form has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
@@ -224,9 +227,9 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    _clean(base, reach, noise.metres)
+    _clean_pose(base, reach, noise.metres)
     turn = math.atan2(A[:3, 0] @ base[:3, 1], A[:3, 0] @ base[:3, 0])
-    return base, cleaned_angle(turn), offset
+    return base, clean_angle(turn), offset
 
 
 def _clean_rotation(T: FloatArray) -> None:
@@ -234,42 +237,47 @@ def _clean_rotation(T: FloatArray) -> None:
     R[np.abs(R) <= ENTRY_ROUNDINGS * EPS] = 0.0
 
 
-def _clean(T: FloatArray, reach: float, noise: float = 0.0) -> None:
+def _clean_pose(T: FloatArray, reach: float, noise: float = 0.0) -> None:
     _clean_rotation(T)
-    T[:3, 3] = [cleaned_length(component, reach, noise) for component in T[:3, 3]]
+    T[:3, 3] = [clean_length(component, reach, noise) for component in T[:3, 3]]
 
 
-def _steps(
+def _find_transforms(
     constants: Sequence[FloatArray],
     phi_in: float,
-    carry: float,
+    delta_in: float,
     reach: float,
-    choices: Choices,
+    options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     # For parallel_offset="first", `_sum_offsets_in_first_row` later adds the offsets along parallel axes.
-    each = choices.parallel_offset != "last"
+    each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
-        step = step_between(
-            shifted_along_z(A, carry), reach, -phi_in, hayati=choices.hayati, delta_each=each, noise=rounding
+        step = find_axis_transform(
+            shift_along_z(A, delta_in),
+            reach,
+            -phi_in,
+            hayati=options.hayati,
+            offset_in_delta=each,
+            noise=rounding,
         )
-        theta = cleaned_angle(phi_in + step.phi)
-        if _needs_reversal(step, theta, choices.sign):
+        theta = clean_angle(phi_in + step.phi)
+        if _needs_reversal(step, theta, options.sign):
             step = step.with_reversed_x()
-            theta = cleaned_angle(phi_in + step.phi)
+            theta = clean_angle(phi_in + step.phi)
         steps.append(step)
         thetas.append(theta)
-        phi_in, carry = step.phi_next, step.delta_next
+        phi_in, delta_in = step.phi_next, step.delta_next
     return steps, thetas
 
 
 def _offset_for_last_row(
-    like: DHTable, A: FloatArray, choices: Choices, noise: PoseTolerance
+    like: DHTable, A: FloatArray, options: DerivationOptions, noise: PoseTolerance
 ) -> float | None:
-    """Return the argument `tip` of `steps_like`."""
+    """Return the argument `tip_offset` of `match_axis_transforms`."""
     row = like.rows[-1]
-    if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
+    if not row.kind.turns or not _has_no_tool(like) or not _fits_last_row(A, options, noise):
         return None
     return float(row.d - A[2, 3])
 
@@ -278,30 +286,30 @@ def _has_no_tool(table: DHTable) -> bool:
     return bool(np.abs(table.tool - np.eye(4)).max() < 1e-6)
 
 
-def _first_like(
+def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Copy theta, and d if it is 0, from the first row of `like`; change the base to compensate."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE_ROUNDINGS * EPS or offset:
-        base = base @ along_axis(angle, offset)
+        base = base @ joint_transform(angle, offset)
         _clean_rotation(base)
     return base, (row.theta, d - offset)
 
 
-def _last_like(
+def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; change the tool to compensate."""
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
-    if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_SLACK:
-        return theta_like(theta, row.theta), d, last, tool
+    if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_TOLERANCE:
+        return match_theta(theta, row.theta), d, last, tool
     offset = d if row.d else 0.0
-    T_tip = along_axis(theta, d) @ between_axes(last.a, last.alpha) @ tool
-    tool = np.linalg.inv(along_axis(row.theta, offset) @ between_axes(row.a, row.alpha)) @ T_tip
-    _clean(tool, like.span or 1.0)
+    T_tip = joint_transform(theta, d) @ link_transform(last.a, last.alpha) @ tool
+    tool = np.linalg.inv(joint_transform(row.theta, offset) @ link_transform(row.a, row.alpha)) @ T_tip
+    _clean_pose(tool, like.span or 1.0)
     if np.abs(tool - np.eye(4)).max() <= ANGLE_ROUNDINGS * EPS:
         tool = np.eye(4)
     return row.theta, offset, AxisTransform(a=row.a, alpha=row.alpha), tool
@@ -310,45 +318,50 @@ def _last_like(
 def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign == "theta" or (not step.a and not by_alpha):
-        return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
+        return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_TOLERANCE
     return (step.a or by_alpha) < 0.0 if sign == "a" else (by_alpha or step.a) < 0.0
 
 
-def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> bool:
+def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
     """Whether the last row can contain the transform A, so that the table needs no tool.
 
     A standard table ends with Rz Tz Tx Rx, and a modified table ends with Rz Tz.
     """
-    if choices.last == "flange":
+    if options.last == "flange":
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
-    if choices.convention is DHConvention.MODIFIED:
+    if options.convention is DHConvention.MODIFIED:
         aside = math.hypot(A[0, 3], A[1, 3])
-        return tilt_of(A) <= noise.radians and A[2, 2] > 0.0 and aside <= 2.0 * noise.metres
+        return tilt_sine(A) <= noise.radians and A[2, 2] > 0.0 and aside <= 2.0 * noise.metres
     return bool(x_along_z <= noise.radians and lateral <= 2.0 * noise.metres)
 
 
-def _last(
-    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: PoseTolerance
+def _make_last_row(
+    A: FloatArray,
+    phi_in: float,
+    delta_in: float,
+    reach: float,
+    options: DerivationOptions,
+    noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Return theta and d of the last row, its other cells, and the tool.
 
     `A` is the tip's pose in a frame with the axes of the last joint's frame and the origin O_{n-1}.
     """
-    if _representable(A, choices, noise):
+    if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
-        a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
-        alpha = cleaned_angle(math.atan2(A[2, 1], A[2, 2]))
+        a = clean_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
+        alpha = clean_angle(math.atan2(A[2, 1], A[2, 2]))
         step = AxisTransform(a=a, alpha=alpha)
-        return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach, noise.metres), step, np.eye(4)
-    d = cleaned_length(carry if choices.last == "flange" else A[2, 3], reach, noise.metres)
+        return clean_angle(phi_in + phi), clean_length(A[2, 3], reach, noise.metres), step, np.eye(4)
+    d = clean_length(delta_in if options.last == "flange" else A[2, 3], reach, noise.metres)
     tool = A.copy()
     tool[2, 3] -= d
     if phi_in:
         Rz = np.eye(4)
         Rz[:2, :2] = [[math.cos(phi_in), -math.sin(phi_in)], [math.sin(phi_in), math.cos(phi_in)]]
         tool = Rz @ tool
-    _clean(tool, reach, noise.metres)
+    _clean_pose(tool, reach, noise.metres)
     return 0.0, d, AxisTransform(), tool
 
 

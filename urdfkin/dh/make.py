@@ -13,49 +13,51 @@ import numpy as np
 
 from urdfkin.dh.common_normals import check_lengths
 from urdfkin.dh.compare.agreement import check_joints
-from urdfkin.dh.compare.signs import align
+from urdfkin.dh.compare.signs import find_sign_fits
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, derive
-from urdfkin.dh.snapping import check_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
+from urdfkin.dh.derive import DerivationOptions, derive
+from urdfkin.dh.snapping import check_snap_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
 #: Tables with a larger difference of cells (rad, or relative to the reach) describe different robots.
-_SAME_ROBOT = 0.1
+_MAX_DIFFERENCE = 0.1
 #: Two cells theta (rad), or two entries of rotation matrices, count as equal up to this difference.
-_SAME_ZERO = 1e-2
+_ZERO_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
 
 
-def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
+def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
     """Return a chain's table with the frames of a reference table.
 
-    `choices.flip` must be the result of `reversed_like`.
+    `options.flip` must be the result of `find_reversed_joints`.
     """
-    standard = replace(choices, convention=DHConvention.STANDARD)
-    return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
+    standard = replace(options, convention=DHConvention.STANDARD)
+    return to_convention(derive(chain, standard, to_convention(reference, "standard")), options.convention)
 
 
-def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
+def find_reversed_joints(
+    chain: FrameChain, options: DerivationOptions, reference: DHTable
+) -> tuple[str, ...]:
     """Return the joints whose positive direction in the reference is opposite to the URDF's."""
     check_joints(chain, reference)
     standard = to_convention(reference, "standard")
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
-    patterns = [fit.senses for fit in align(chain, without_ends)]
+    patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
     # Base and tool can compensate for a reversed first or last joint, so both signs of each are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
     for senses in dict.fromkeys(patterns):
         flip = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
-        table = derive(chain, replace(choices, convention=DHConvention.STANDARD, flip=flip), standard)
+        table = derive(chain, replace(options, convention=DHConvention.STANDARD, flip=flip), standard)
         if (key := _difference_key(table, standard, chain.reach or 1.0)) < best:
             best, best_flip = key, flip
-    if best[0] > _SAME_ROBOT:
+    if best[0] > _MAX_DIFFERENCE:
         raise InputError(
             "the table in the argument `like` describes a different robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
@@ -81,16 +83,16 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
             unique = max(unique, abs(row.d - other.d) / reach)
         elif 0 < i < n - 1:
             shiftable = max(shiftable, theta)
-        zeros += (theta > _SAME_ZERO) + (row.d * other.d < 0.0)
+        zeros += (theta > _ZERO_TOLERANCE) + (row.d * other.d < 0.0)
     ends = sum(
-        float(np.abs(T[:3, :3] - T_reference[:3, :3]).max() > _SAME_ZERO)
+        float(np.abs(T[:3, :3] - T_reference[:3, :3]).max() > _ZERO_TOLERANCE)
         for T, T_reference in ((table.base, reference.base), (table.tool, reference.tool))
     )
     power = math.ceil(math.log10(max(unique, shiftable, _ROUNDING)))
     return round(unique, 2), power, zeros, ends, sum(row.sense < 0 for row in table.rows)
 
 
-def dh_table(
+def make_dh_table(
     tree: KinematicTree,
     tip: str,
     base: str | None = None,
@@ -153,7 +155,7 @@ def dh_table(
     for name in flip:
         if name not in names:
             raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
-    choices = Choices(
+    options = DerivationOptions(
         convention_of(convention),
         near_parallel,
         last,
@@ -164,15 +166,15 @@ def dh_table(
         slide,
     )
     if like is not None:
-        choices = replace(choices, flip=reversed_like(exact, choices, like))
+        options = replace(options, flip=find_reversed_joints(exact, options, like))
 
-    def derived(path: FrameChain) -> DHTable:
-        return derive(path, choices) if like is None else derive_like(path, choices, like)
+    def make_table(path: FrameChain) -> DHTable:
+        return derive(path, options) if like is None else derive_matching_table(path, options, like)
 
-    tolerance = check_tolerance(snap)
+    tolerance = check_snap_tolerance(snap)
     if tolerance == 0.0:
-        return derived(exact)
+        return make_table(exact)
     path, pose_changes = snap_chain(tree, tip, base, tolerance)
-    table, changes = snap_thetas(derived(path), exact, tolerance)
+    table, changes = snap_thetas(make_table(path), exact, tolerance)
     changes += [replace(change, row=row_of_constant(table, k)) for k, change in pose_changes]
     return replace(table, snap=snap_report(exact, table, changes, tolerance))

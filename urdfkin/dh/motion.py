@@ -15,7 +15,7 @@ import numpy as np
 
 from urdfkin.compiled.evaluate import accelerations, jacobians, velocities
 from urdfkin.compiled.plan import CompiledTree, compile_tree
-from urdfkin.dh.convert import free_tree
+from urdfkin.dh.convert import to_free_tree
 from urdfkin.dh.table import DHTable
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
@@ -23,8 +23,8 @@ from urdfkin.model.tree import FloatArray
 
 
 @lru_cache(maxsize=64)
-def _compiled_tree(table: DHTable) -> CompiledTree:
-    tree = free_tree(table)
+def _compile_table(table: DHTable) -> CompiledTree:
+    tree = to_free_tree(table)
     return compile_tree(tree, [len(tree.links) - 1])
 
 
@@ -35,8 +35,8 @@ def jacobian(
 
     `q` (..., coordinates) is in the order of `joint_names` (rad or m). The world is the table's base frame.
     """
-    shape, (values,) = _flat(table, table.coupling.values(q))
-    J = jacobians(_compiled_tree(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
+    shape, (values,) = _flatten(table, table.coupling.values(q))
+    J = jacobians(_compile_table(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
     return np.ascontiguousarray(J.reshape(*shape, 6, len(table.joint_names)))
 
 
@@ -50,8 +50,8 @@ def velocity(
 
     `v` is in rad/s or m/s.
     """
-    shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
-    return velocities(_compiled_tree(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
+    shape, (values, rates) = _flatten(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
+    return velocities(_compile_table(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
 
 
 def acceleration(
@@ -66,8 +66,8 @@ def acceleration(
     `a` is in rad/s^2 or m/s^2.
     """
     arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
-    shape, (values, velocities_, accelerations_) = _flat(table, *arrays)
-    tree = _compiled_tree(table)
+    shape, (values, velocities_, accelerations_) = _flatten(table, *arrays)
+    tree = _compile_table(table)
     return accelerations(tree, values, velocities_, accelerations_, Reference.of(reference)).reshape(
         *shape, 6
     )
@@ -77,7 +77,7 @@ def _joint_derivatives(table: DHTable, rates: ConfigurationLike, what: str) -> F
     return table.coupling.parse(rates, what) @ table.coupling.matrix.T
 
 
-def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
+def _flatten(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Return the common batch shape, and the broadcast arrays with shape (n, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)

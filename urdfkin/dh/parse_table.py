@@ -21,10 +21,10 @@ from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
-from urdfkin.dh.rows import LIMIT_KEYS, Literal, table_from_mapping
-from urdfkin.dh.screws import ProductOfExponentials, screws_of_mapping
+from urdfkin.dh.rows import LIMIT_KEYS, NumberWithText, table_from_mapping
+from urdfkin.dh.screws import ProductOfExponentials, screws_from_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, plain_text
+from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, to_plain_text
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNITS
@@ -34,7 +34,7 @@ from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
-_PRINTED = 1e-5
+_PRINTED_TOLERANCE = 1e-5
 #: Blank lines and Markdown fences may separate the heading and the three rows of a printed pose.
 _POSE_LINES = 6
 #: A line such as `convention: modified`, with or without a comment mark.
@@ -64,28 +64,28 @@ _TITLE = re.compile(
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
-def from_sheet(text: str) -> dict[str, Any]:
+def find_table_in_text(text: str) -> dict[str, Any]:
     """Find the table in a text, and return it as plain data; raise InputError without a valid table."""
     lines = text.lstrip("\ufeff").splitlines()
-    for form in (_latex, _bars, _separated, _aligned):
+    for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
         if (grid := form(lines)) is not None:
             break
     else:
-        raise _no_header(lines)
+        raise _missing_header_error(lines)
     # If a robot has the name "robot", its title begins with "robot:" and looks like a setting.
-    without_title = [line for line in grid.around if not _TITLE.search(line)]
-    data = _settings(without_title, _CSV_SETTING if form is _separated else _SETTING)
-    if "convention" not in data and (convention := _convention(grid)):
+    without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
+    data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
+    if "convention" not in data and (convention := _find_convention(grid)):
         data["convention"] = convention
-    for line in grid.around:
-        if title := _TITLE.search(_unescaped(line.replace("`", ""))):
+    for line in grid.other_lines:
+        if title := _TITLE.search(_unescape(line.replace("`", ""))):
             names = {"robot": title["robot"], "base_frame": title["base"], "tip_frame": title["tip"]}
             data = names | data
     for end in ("base", "tool"):
-        if end not in data and (pose := _pose(end, grid.around)):
+        if end not in data and (pose := _parse_pose(end, grid.other_lines)):
             data[end] = pose
-    data["rows"] = [_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
-    _interpret_variables(data, _coordinate_names(grid.around))
+    data["rows"] = [_parse_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
+    _interpret_variables(data, _parse_coordinate_names(grid.other_lines))
     return data
 
 
@@ -104,14 +104,14 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The cells of a table in a text; `around` contains all lines outside the table.
+    """The cells of a table in a text; `other_lines` contains all lines outside the table.
 
     If `strict` is true, an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
-    around: list[str]
+    other_lines: list[str]
     decimal_commas: bool = False
     strict: bool = False
 
@@ -119,10 +119,10 @@ class _Grid:
 # -- the table's position ------------------------------------------------------------------------------
 
 
-def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -> _Grid | None:
+def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: str = "") -> _Grid | None:
     """Find the first line of headings, and the rows below it up to the end of the table."""
     for k, line in enumerate(lines):
-        columns = _columns(split(line))
+        columns = _parse_columns(split(line))
         if columns is None:
             continue
         rows, end = list[list[str]](), k + 1
@@ -145,15 +145,15 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
             rows.append(cells)
         else:
             end = len(lines)
-        return _Grid(columns, rows, [*lines[:k], *lines[end:]], mark in (";", "\t"), mark == ",")
+        return _Grid(columns, rows, [*lines[:k], *lines[end:]], separator in (";", "\t"), separator == ",")
     return None
 
 
-def _no_header(lines: list[str]) -> InputError:
+def _missing_header_error(lines: list[str]) -> InputError:
     split = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     rows = [[cell.strip() for cell in cells if cell.strip()] for cells in split]
-    best = max(rows, key=lambda cells: sum(_column(cell).name in COLUMNS for cell in cells), default=[])
-    names = [_column(cell).name for cell in best]
+    best = max(rows, key=lambda cells: sum(_parse_column(cell).name in COLUMNS for cell in cells), default=[])
+    names = [_parse_column(cell).name for cell in best]
     missing = next((name for name in COLUMNS if name not in names), None)
     if missing is None:
         return InputError(
@@ -171,7 +171,7 @@ def _no_header(lines: list[str]) -> InputError:
     )
 
 
-def _latex(lines: list[str]) -> _Grid | None:
+def _parse_latex(lines: list[str]) -> _Grid | None:
     text = "\n".join(lines)
     found = re.search(r"\\begin\{(tabular[x*]?|array)\}(?:\{[^{}]*\})*(.*?)\\end\{\1\}", text, re.DOTALL)
     if found is None:
@@ -180,14 +180,14 @@ def _latex(lines: list[str]) -> _Grid | None:
         r"\\(?:toprule|midrule|bottomrule|hline|addlinespace|cline\{[^}]*\})|(?<!\\)%.*", "", found[2]
     )
     rows = [" ".join(line.split()) for line in re.split(r"\\\\(?:\[[^\]]*\])?", body)]
-    grid = _grid(
+    grid = _find_grid(
         [row for row in rows if row], lambda row: [cell.strip() for cell in re.split(r"(?<!\\)&", row)]
     )
-    around = (text[: found.start()] + text[found.end() :]).splitlines()
-    return grid and _Grid(grid.columns, grid.rows, around)
+    other_lines = (text[: found.start()] + text[found.end() :]).splitlines()
+    return grid and _Grid(grid.columns, grid.rows, other_lines)
 
 
-def _bars(lines: list[str]) -> _Grid | None:
+def _parse_bars(lines: list[str]) -> _Grid | None:
     """Parse cells that are separated by | or by vertical box-drawing characters."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
     plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown escapes brackets: a \[m\].
@@ -195,21 +195,24 @@ def _bars(lines: list[str]) -> _Grid | None:
     def split(line: str) -> list[str]:
         return [cell.strip().strip("`") for cell in line.strip().strip("|").split("|")] if "|" in line else []
 
-    return _grid(plain, split)
+    return _find_grid(plain, split)
 
 
-def _separated(lines: list[str]) -> _Grid | None:
+def _parse_separated(lines: list[str]) -> _Grid | None:
     """Parse CSV; if semicolons or tabs separate the cells, a comma in a cell is a decimal comma."""
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
-    grids = (_grid(lines, partial(_csv_cells, mark=mark), mark) for mark in (";", "\t", ","))
+    grids = (
+        _find_grid(lines, partial(_split_csv_line, separator=separator), separator)
+        for separator in (";", "\t", ",")
+    )
     return next(filter(None, grids), None)
 
 
-def _csv_cells(line: str, mark: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=mark), [])]
+def _split_csv_line(line: str, separator: str) -> list[str]:
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
 
 
-def _aligned(lines: list[str]) -> _Grid | None:
+def _parse_aligned(lines: list[str]) -> _Grid | None:
     """Parse cells that are separated by two or more blanks, or by one blank if no cell contains blanks."""
 
     def loose(line: str) -> list[str]:
@@ -219,12 +222,12 @@ def _aligned(lines: list[str]) -> _Grid | None:
         joined = re.sub(r"\s*([-+*/])\s+(?=\S)", r"\1", line.strip())
         return re.sub(r"\s+([\[(])", r"\1", joined).split()
 
-    return _grid(lines, loose) or _grid(lines, tight)
+    return _find_grid(lines, loose) or _find_grid(lines, tight)
 
 
-def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
+def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
     """Parse a line of headings; return None unless a, alpha, d and theta all occur."""
-    columns = tuple(map(_column, cells))
+    columns = tuple(map(_parse_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in COLUMNS):
         return None
@@ -234,8 +237,8 @@ def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
     return columns
 
 
-def _column(heading: str) -> _Column:
-    text = plain_text(heading).strip("*` ")
+def _parse_column(heading: str) -> _Column:
+    text = to_plain_text(heading).strip("*` ")
     unit = None
     if found := re.search(
         r"[\[(/]\s*(" + "|".join(sorted(UNITS, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
@@ -254,7 +257,7 @@ def _column(heading: str) -> _Column:
 # -- the lines around the table ------------------------------------------------------------------------
 
 
-def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
+def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for line in lines:
         if found := pattern.match(line.strip()):
@@ -265,51 +268,51 @@ def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
     return data
 
 
-def _convention(grid: _Grid) -> str | None:
+def _find_convention(grid: _Grid) -> str | None:
     """Return the convention that the headings or the text name; None if the text names none or both."""
     if any(column.previous for column in grid.columns):
         return "modified"
-    text = "\n".join(map(plain_text, grid.around))
+    text = "\n".join(map(to_plain_text, grid.other_lines))
     names = [name for name, pattern in _CONVENTIONS.items() if re.search(pattern, text, re.IGNORECASE)]
     return names[0] if len(names) == 1 else None
 
 
-def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
+def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
     """Parse a pose as urdfkin prints it: three rows under `base (metres):`, or a LaTeX matrix."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
-        return _rigid(
+        return _nearest_rigid(
             [[parse_cell(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")], end
         )
     for k, line in enumerate(lines):
         if line.strip().lower().startswith(f"{end} (metres):"):
             rows = [row.split() for row in lines[k + 1 : k + 1 + _POSE_LINES] if row.strip(" `")][:3]
             if len(rows) == 3 and all(len(row) == 4 for row in rows):
-                return _rigid([[float(number) for number in row] for row in rows], end)
+                return _nearest_rigid([[float(number) for number in row] for row in rows], end)
     return None
 
 
-def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
+def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
     """Replace a rotation matrix of rounded numbers by the nearest exact rotation matrix."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     correction = polar_factor(pose[:3, :3]) - pose[:3, :3]
-    if ROUNDED < np.abs(correction).max() < _PRINTED:
+    if ROUNDED < np.abs(correction).max() < _PRINTED_TOLERANCE:
         pose[:3, :3] += correction
     return [[float(number) for number in row] for row in pose]
 
 
-def _coordinate_names(lines: list[str]) -> list[str]:
+def _parse_coordinate_names(lines: list[str]) -> list[str]:
     """Parse the joint names in a line such as `with q1 = left, q2 = right`."""
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
-    return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
+    return [_unescape(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
 
 # -- rows ----------------------------------------------------------------------------------------------
 
 
-def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
+def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _ROW_NUMBERS:
@@ -318,15 +321,15 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             continue
         elif column.name in (*COLUMNS, "beta", "offset"):
             where = f"row {index + 1}, {column.name}"
-            row[column.name] = _with_unit(cell, column, where, grid.decimal_commas)
+            row[column.name] = _add_unit(cell, column, where, grid.decimal_commas)
         elif column.name == "kind":
             row["kind"] = _KINDS.get(cell, cell)
         else:
-            row[column.name] = from_csv_cell(_unescaped(cell)) if column.name in ("joint", "leader") else cell
-    return _nested(row)
+            row[column.name] = from_csv_cell(_unescape(cell)) if column.name in ("joint", "leader") else cell
+    return _nest_row(row)
 
 
-def _with_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
+def _add_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
     """Return the plain text of a cell, with the unit of its column if the cell has none."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", original) if decimal_commas else original
     try:
@@ -339,16 +342,16 @@ def _with_unit(original: str, column: _Column, where: str, decimal_commas: bool)
             found=safe_repr(original),
             remedy=f"{problem}: write 1.5708, pi/2 or 90 deg",
         ) from None
-    plain = plain_text(text)
+    plain = to_plain_text(text)
     return f"{plain} {column.unit}" if column.unit and cell.unit is None and cell.number else plain
 
 
-def _unescaped(name: str) -> str:
+def _unescape(name: str) -> str:
     r"""Remove the escapes of Markdown and LaTeX from a name: `a\_b` becomes a_b."""
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
-def _nested(row: dict[str, Any]) -> dict[str, Any]:
+def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
     """Move the cells of the mimic rule, and the cells of the limits, into mappings of their own.
 
     If the row has no mimic rule, the cell `offset` is added to theta or d.
@@ -422,7 +425,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
     >>> len(table.rows), table.convention.value
     (6, 'standard')
     """
-    return table_of(read_mapping(path), str(path))
+    return parse_table_data(read_mapping(path), str(path))
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
@@ -431,7 +434,9 @@ def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExp
     The function raises the same errors as `read_table`.
     """
     data = read_mapping(path)
-    return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
+    return (
+        _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))
+    )
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
@@ -439,14 +444,14 @@ def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
-    return table_of(mapping_from_text(text, suffix, where), where)
+    return parse_table_data(mapping_from_text(text, suffix, where), where)
 
 
-def table_of(data: Mapping[str, Any], where: str) -> DHTable:
-    return _with_place(table_from_mapping, data, where)
+def parse_table_data(data: Mapping[str, Any], where: str) -> DHTable:
+    return _add_place(table_from_mapping, data, where)
 
 
-def _with_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
+def _add_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any], where: str) -> _T:
     try:
         return make(data)
     except UrdfkinError as error:
@@ -486,21 +491,21 @@ def _is_markup(path: Path) -> bool:
 
 
 _PARSERS: dict[str, Callable[[str], Any]] = {
-    ".toml": partial(tomllib.loads, parse_float=Literal),
-    ".json": partial(json.loads, parse_float=Literal),
-    **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), from_sheet),
+    ".toml": partial(tomllib.loads, parse_float=NumberWithText),
+    ".json": partial(json.loads, parse_float=NumberWithText),
+    **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), find_table_in_text),
 }
 
 
-def references() -> dict[str, Path]:
+def published_tables() -> dict[str, Path]:
     """Return the files of the published tables that urdfkin contains, by name."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
-def published(robot: str) -> list[str]:
+def suggest_published_tables(robot: str) -> list[str]:
     """Return a line with the option `--like` for each published table of a robot."""
     lines = []
-    for name, path in references().items():
+    for name, path in published_tables().items():
         data = read_mapping(path)
         if data.get("robot") == robot:
             snap = f" --snap {data['snap']:.0e}" if "snap" in data else ""
@@ -513,7 +518,7 @@ def reference_path(name: str) -> Path:
     path = Path(name)
     if path.suffix or exists(path):
         return path
-    files = references()
+    files = published_tables()
     if name not in files:
         raise UnknownNameError("reference table", name, files)
     return files[name]

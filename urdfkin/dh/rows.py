@@ -30,14 +30,14 @@ from numpy.typing import ArrayLike
 from urdfkin.dh.table import DHRow, DHTable, convention_of, looks_round
 from urdfkin.dh.units import (
     COLUMNS,
-    Angles,
+    AngleUnit,
     Cell,
     InvalidCellError,
     Units,
-    cell_in_si,
+    convert_to_si,
     parse_cell,
-    read_number,
-    units_of,
+    parse_number,
+    parse_units,
 )
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
@@ -58,49 +58,49 @@ _TABLE_KEYS = (
     *("coordinates", "rows"),
 )
 #: These keys contain information about a table, and do not change the table.
-_NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
-_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
+_NOTE_KEYS = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
+_MAPPING_REMEDY = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
 
-class Literal(float):
+class NumberWithText(float):
     """A number with its original text."""
 
     text: str
 
-    def __new__(cls, text: str) -> Literal:
+    def __new__(cls, text: str) -> NumberWithText:
         number = super().__new__(cls, text)
         number.text = text
         return number
 
 
-def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
+def half_digits_by_row(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
     """Return half a unit of the last digit of each cell (metres or radians), for each row.
 
     `data` must come from `urdfkin.dh.parse_table.mapping_from_text`, which keeps the text of the numbers.
     """
-    units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
+    units = parse_units(data.get("angles", "radians"), data.get("lengths", "metres"))
     rows = []
     for row in data["rows"]:
-        cells = row if isinstance(row, Mapping) else by_column(row)
-        rows.append({name: _last_digit(name, cells[name], units) for name in _CELLS if name in cells})
+        cells = row if isinstance(row, Mapping) else name_cells(row)
+        rows.append({name: _half_digit_in_si(name, cells[name], units) for name in _CELLS if name in cells})
     return tuple(rows)
 
 
-def _last_digit(name: str, value: object, units: Units) -> float:
+def _half_digit_in_si(name: str, value: object, units: Units) -> float:
     if isinstance(value, str):
-        units = units_in(parse_cell(value), units)
-    return cell_in_si(name, half_a_digit(value, name in ("a", "d") and units.counts_millimetres), units)
+        units = units_of_cell(parse_cell(value), units)
+    return convert_to_si(name, half_digit(value, name in ("a", "d") and units.uses_millimetres), units)
 
 
-def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
+def half_digit(value: object, whole_is_rounded: bool = False) -> float:
     """Return half a unit of a written number's last digit; 0 if the number is exact.
 
     A whole number is exact unless `whole_is_rounded`: 425 mm is uncertain by 0.5 mm, and 90 deg is exact.
 
-    >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
+    >>> half_digit(NumberWithText("0.3111")), half_digit("90"), half_digit(425, True), half_digit("pi")
     (5e-05, 0.0, 0.5, 0.0)
     """
-    text = value.text if isinstance(value, Literal) else str(value)
+    text = value.text if isinstance(value, NumberWithText) else str(value)
     text = (parse_cell(value).text or "0") if isinstance(value, str) else text
     try:
         number = Decimal(text)
@@ -112,7 +112,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-def by_column(row: Sequence[Any]) -> dict[str, Any]:
+def name_cells(row: Sequence[Any]) -> dict[str, Any]:
     return dict(zip((*COLUMNS, "kind"), row, strict=False))
 
 
@@ -122,17 +122,17 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
-    fields = row if isinstance(row, Mapping) else _of_list(row, where)
+    fields = row if isinstance(row, Mapping) else _parse_list(row, where)
     check_keys(fields, _ROW_KEYS, "a row", where)
     fields = _split_variable(fields, index, where)
-    cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in _CELLS}
+    cells = {name: _parse_value(name, fields.get(name, 0.0), units, where) for name in _CELLS}
     return DHRow(
         **cells,
-        kind=_kind(fields.get("kind", "R"), where),
-        joint=name_of(fields.get("joint", f"joint_{index + 1}"), f"{where}, joint"),
-        sense=_sense(fields.get("sense", 1), where),
-        mimic=_mimic(fields.get("mimic"), fields, units, where),
-        limit=_limit(fields.get("limit"), fields, units, where),
+        kind=_parse_kind(fields.get("kind", "R"), where),
+        joint=parse_name(fields.get("joint", f"joint_{index + 1}"), f"{where}, joint"),
+        sense=_parse_sense(fields.get("sense", 1), where),
+        mimic=_parse_mimic(fields.get("mimic"), fields, units, where),
+        limit=_parse_limit(fields.get("limit"), fields, units, where),
     )
 
 
@@ -142,7 +142,7 @@ def _check_order(rows: Sequence[Any]) -> None:
     Nearly all angles in tables are multiples of 15 degrees. Most lengths are not multiples of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
-    if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
+    if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):
         return
     first, second, _, fourth = ([row[k] for row in lists if row[k] != 0] for k in range(4))
     if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
@@ -151,17 +151,17 @@ def _check_order(rows: Sequence[Any]) -> None:
             f" {', '.join(COLUMNS)}",
             where=f"rows 1 to {len(rows)}",
             found=f"second column {second[0]!r}, fourth column {fourth[0]!r}",
-            remedy=_BY_NAME,
+            remedy=_MAPPING_REMEDY,
         )
 
 
-def name_of(value: Any, where: str) -> str:
+def parse_name(value: Any, where: str) -> str:
     if not isinstance(value, str) or not value.strip():
         raise InputError("a name must be text", where=where, found=repr(value), remedy="write it in quotes")
     return value
 
 
-def _has_order(row: Sequence[Any]) -> bool:
+def _has_column_order(row: Sequence[Any]) -> bool:
     return len(row) == len(COLUMNS) or (len(row) == len(COLUMNS) + 1 and isinstance(row[-1], str))
 
 
@@ -173,7 +173,7 @@ def _looks_round(value: Any) -> bool:
     return looks_round(value) or looks_round(value, twelfth=15.0)
 
 
-def _of_list(row: Any, where: str) -> dict[str, Any]:
+def _parse_list(row: Any, where: str) -> dict[str, Any]:
     form = f"[{', '.join(COLUMNS)}, 'R' or 'P']"
     if not isinstance(row, Sequence) or isinstance(row, (str, bytes)):
         raise InputError(f"a row must be a mapping or {form}", where=where, found=repr(row))
@@ -182,16 +182,16 @@ def _of_list(row: Any, where: str) -> dict[str, Any]:
             f"a row must be a mapping or {form}",
             where=where,
             found=f"{len(row)} entries, {list(row)!r}",
-            remedy=_BY_NAME,
+            remedy=_MAPPING_REMEDY,
         )
     if len(row) > len(COLUMNS) and not isinstance(row[-1], str):
         raise InputError(
             f"a row's fifth entry must be 'R' or 'P': {form}",
             where=where,
             found=repr(row[-1]),
-            remedy=f"the Robotics Toolbox's order is theta, d, a, alpha, sigma: {_BY_NAME}",
+            remedy=f"the Robotics Toolbox's order is theta, d, a, alpha, sigma: {_MAPPING_REMEDY}",
         )
-    return by_column(row)
+    return name_cells(row)
 
 
 def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str | None = None) -> None:
@@ -208,14 +208,18 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
     """Replace a cell such as "q3 + pi" with the constant pi; add the keys `kind` and `sense` to the row."""
     texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
-    cells = {name: _parse_cell(text, f"{where}, {name}") for name, text in texts.items()}
+    cells = {name: _parse_cell_text(text, f"{where}, {name}") for name, text in texts.items()}
     variables = [name for name, cell in cells.items() if cell.factor is not None]
     if not variables:
         return fields
     name = variables[0]
     cell, kind = cells[name], {"theta": "R", "d": "P"}.get(name)
     at, found = f"{where}, {name}", repr(texts[name])
-    if len(variables) > 1 or kind is None or _kind(fields.get("kind", kind), where).turns != (kind == "R"):
+    if (
+        len(variables) > 1
+        or kind is None
+        or _parse_kind(fields.get("kind", kind), where).turns != (kind == "R")
+    ):
         raise InputError(
             "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
@@ -232,13 +236,13 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
     return {"kind": kind, **fields, name: cell.constant, "sense": cell.factor}
 
 
-def units_in(cell: Cell, units: Units) -> Units:
+def units_of_cell(cell: Cell, units: Units) -> Units:
     if cell.unit in ("m", "mm"):
-        return units_of(units.angles, cell.unit, units.digits)
-    return units_of(cell.unit or units.angles, units.lengths, units.digits)
+        return parse_units(units.angles, cell.unit, units.digits)
+    return parse_units(cell.unit or units.angles, units.lengths, units.digits)
 
 
-def _parse_cell(text: str, where: str) -> Cell:
+def _parse_cell_text(text: str, where: str) -> Cell:
     try:
         return parse_cell(text)
     except InvalidCellError as error:
@@ -250,19 +254,19 @@ def _parse_cell(text: str, where: str) -> Cell:
         ) from None
 
 
-def _cell(name: str, value: Any, units: Units, where: str) -> float:
+def _parse_value(name: str, value: Any, units: Units, where: str) -> float:
     is_length, at, unit = name in ("a", "d"), f"{where}, {name}", None
     if isinstance(value, str):
-        cell = _parse_cell(value, at)
+        cell = _parse_cell_text(value, at)
         number, unit = cell.number, cell.unit
         if unit is not None:
             if (unit in ("m", "mm")) != is_length:
                 kind = "a length" if is_length else "an angle"
                 raise InputError(f"{name} must be {kind}", where=at, found=repr(value))
-            units = units_in(cell, units)
+            units = units_of_cell(cell, units)
     else:
-        number = read_number(value, at)
-    may_be_degrees = not is_length and unit is None and units.angles is Angles.RADIANS
+        number = parse_number(value, at)
+    may_be_degrees = not is_length and unit is None and units.angles is AngleUnit.RADIANS
     if may_be_degrees and abs(number) > 2.0 * math.pi:
         raise InputError(
             f"{name} is more than one turn in radians",
@@ -270,10 +274,10 @@ def _cell(name: str, value: Any, units: Units, where: str) -> float:
             found=repr(value),
             remedy="write angles = 'degrees' if the table's angles are degrees",
         )
-    return cell_in_si(name, number, units)
+    return convert_to_si(name, number, units)
 
 
-def _kind(value: Any, where: str) -> JointKind:
+def _parse_kind(value: Any, where: str) -> JointKind:
     kind = _KINDS.get(value.strip().lower()) if isinstance(value, str) else None
     if kind is None:
         raise InputError(
@@ -285,8 +289,8 @@ def _kind(value: Any, where: str) -> JointKind:
     return kind
 
 
-def _sense(value: Any, where: str) -> int:
-    number = read_number(value, f"{where}, sense")
+def _parse_sense(value: Any, where: str) -> int:
+    number = parse_number(value, f"{where}, sense")
     if number not in (1.0, -1.0):
         raise InputError(
             "`sense` must be 1 or -1",
@@ -297,12 +301,12 @@ def _sense(value: Any, where: str) -> int:
     return int(number)
 
 
-def _joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    number = read_number(value, f"{where}, {name}")
-    return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
+def _parse_joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
+    number = parse_number(value, f"{where}, {name}")
+    return convert_to_si("theta" if _parse_kind(fields.get("kind", "R"), where).turns else "d", number, units)
 
 
-def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Mimic | None:
+def _parse_mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Mimic | None:
     if value is None:
         return None
     if not isinstance(value, Mapping) or "leader" not in value:
@@ -311,13 +315,13 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
         )
     check_keys(value, _MIMIC_KEYS, "mimic", where)
     return Mimic(
-        name_of(value["leader"], f"{where}, leader"),
-        read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
-        _joint_value("offset", value.get("offset", 0.0), fields, units, where),
+        parse_name(value["leader"], f"{where}, leader"),
+        parse_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
+        _parse_joint_value("offset", value.get("offset", 0.0), fields, units, where),
     )
 
 
-def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Limit | None:
+def _parse_limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> Limit | None:
     if value is None:
         return None
     if not isinstance(value, Mapping):
@@ -326,7 +330,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         )
     check_keys(value, LIMIT_KEYS, "limit", where)
     lower, upper, velocity = (
-        _joint_value(name, value[name], fields, units, where) if name in value else default
+        _parse_joint_value(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
     )
     if lower > upper:
@@ -335,7 +339,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
             where=f"{where}, limit",
             found=f"{value['lower']!r} and {value['upper']!r}",
         )
-    effort = read_number(value["effort"], f"{where}, effort") if "effort" in value else math.inf
+    effort = parse_number(value["effort"], f"{where}, effort") if "effort" in value else math.inf
     return Limit(lower, upper, velocity, effort)
 
 
@@ -377,7 +381,7 @@ def table_from_rows(
         >>> table.joint_names, table.placement([0, 0])[:3, 3].tolist()
         (('joint_1', 'joint_2'), [0.4, 0.0, 0.3])
     """
-    units = units_of(angles, lengths)
+    units = parse_units(angles, lengths)
     rows = rows.tolist() if isinstance(rows, np.ndarray) else rows
     if not isinstance(rows, Sequence) or isinstance(rows, (str, bytes)):
         raise InputError("a table needs a list of rows", where="rows", found=safe_repr(rows))
@@ -394,11 +398,11 @@ def table_from_rows(
     return DHTable(
         convention_of(convention),
         parsed,
-        _pose(base, "base", units),
-        _pose(tool, "tool", units),
-        name_of(robot, "robot"),
-        name_of(base_frame, "base_frame"),
-        name_of(tip_frame, "tip_frame"),
+        _parse_pose(base, "base", units),
+        _parse_pose(tool, "tool", units),
+        parse_name(robot, "robot"),
+        parse_name(base_frame, "base_frame"),
+        parse_name(tip_frame, "tip_frame"),
     )
 
 
@@ -410,7 +414,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
             remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=QuestionsSection.WHICH_DH_CONVENTION,
         )
-    check_keys([key for key in data if key not in _NOTES], _TABLE_KEYS, "a table")
+    check_keys([key for key in data if key not in _NOTE_KEYS], _TABLE_KEYS, "a table")
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
     return table_from_rows(data.get("rows"), data["convention"], **options)
 
@@ -421,7 +425,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
             "`coordinates` must be a list of names", where="coordinates", found=repr(coordinates)
         )
     independent = {row.joint for row in rows if row.mimic is None}
-    known = [*independent, *(name_of(name, "coordinates") for name in coordinates)]
+    known = [*independent, *(parse_name(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
         if row.mimic is None or row.mimic.leader in known:
             continue
@@ -438,7 +442,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
         raise error
 
 
-def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
+def _parse_pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
     if value is None:
         return np.eye(4)
     if isinstance(value, np.ndarray):
@@ -451,8 +455,8 @@ def _pose(value: ArrayLike | None, what: str, units: Units) -> FloatArray:
     pose = np.eye(4)
     for i, row in enumerate(rows):
         pose[i] = [
-            read_number(number, f"{what}, row {i + 1}, column {j + 1}") for j, number in enumerate(row)
+            parse_number(number, f"{what}, row {i + 1}, column {j + 1}") for j, number in enumerate(row)
         ]
-    if units.counts_millimetres:
+    if units.uses_millimetres:
         pose[:3, 3] /= 1000.0
     return pose

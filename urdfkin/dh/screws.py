@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.convert import UNBOUNDED_SLIDE, serial_tree
+from urdfkin.dh.convert import DEFAULT_PRISMATIC_LIMIT, make_serial_tree
 from urdfkin.dh.export.text import pose_matrix
 from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
-from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, six_digits
+from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, format_number
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
@@ -43,7 +43,7 @@ from urdfkin.model.tree import (
 )
 
 #: Largest deviation of a handwritten axis from length 1, of a pitch (m/rad) from 0, and of M from a rotation.
-_WRITTEN = 1e-4
+_HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
 
@@ -70,7 +70,7 @@ class ProductOfExponentials(Displayable):
 
     Example:
         >>> M = [[1, 0, 0, 2], [0, 1, 0, 0], [0, 0, 1, 0]]
-        >>> arm = screws_from([[0, 0, 1, 0, 0, 0], [0, 0, 1, 0, -1, 0]], M)
+        >>> arm = screws_from_rows([[0, 0, 1, 0, 0, 0], [0, 0, 1, 0, -1, 0]], M)
         >>> arm.placement([0.0, np.pi / 2])[:3, 3].round(12).tolist()
         [1.0, 1.0, 0.0]
     """
@@ -86,7 +86,7 @@ class ProductOfExponentials(Displayable):
         path = f"{self.robot}: {self.base_frame} to {self.tip_frame}"
         return log_line(f"<ProductOfExponentials {path}, {len(self.joints)} joints>")
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         return screws_document(self, digits=6)
 
     @cached_property
@@ -200,17 +200,17 @@ class ProductOfExponentials(Displayable):
         links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints), self.tip_frame]
         joints, origin = list[Joint](), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
-            limit = joint.limit if joint.kind.turns else joint.limit or UNBOUNDED_SLIDE
+            limit = joint.limit if joint.kind.turns else joint.limit or DEFAULT_PRISMATIC_LIMIT
             axis = screw[:3] if joint.kind.turns else screw[3:]
             T = pose(p=point - origin)
             joints.append(Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic))
             origin = point
         T_tip, axis = pose(p=-origin) @ self.M, np.array([1.0, 0.0, 0.0])
         joints.append(Joint(f"{self.tip_frame}_fixed", JointKind.FIXED, 0, T_tip, axis))
-        return serial_tree(self.robot, links, joints)
+        return make_serial_tree(self.robot, links, joints)
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return the screws as plain data for `screws_of_mapping`, without mimic rules and limits.
+        """Return the screws as plain data for `screws_from_mapping`, without mimic rules and limits.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").as_mapping()["joints"]
@@ -232,7 +232,7 @@ def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocu
     heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for title, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
         cells = [
-            (str(i), joint.name, *(six_digits(x, digits=digits) for x in row))
+            (str(i), joint.name, *(format_number(x, digits=digits) for x in row))
             for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
         ]
         parts += ["", title, Table(heads, cells, left=(1,), names=(1,))]
@@ -241,7 +241,7 @@ def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocu
     return TextDocument(f"{path}, product of exponentials (metres, angular first)", parts)
 
 
-def screws_of(path: FrameChain) -> ProductOfExponentials:
+def make_screws(path: FrameChain) -> ProductOfExponentials:
     frames, rows = path.path.frames(np.zeros(len(path.joints)))[::2], list[FloatArray]()
     for joint, T in zip(path.joints, frames, strict=False):
         z, p = T[:3, 2], T[:3, 3]
@@ -251,12 +251,12 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
     return ProductOfExponentials(joints, freeze(frames[-1]), freeze(np.array(rows).reshape(-1, 6)), *ends)
 
 
-def _rigid(M: FloatArray) -> FloatArray:
+def _nearest_rigid(M: FloatArray) -> FloatArray:
     """Return the rigid transform nearest to M, whose numbers may be rounded; an exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
-    if rotation_defect(R) > _WRITTEN:
+    if rotation_defect(R) > _HANDWRITTEN_TOLERANCE:
         raise InputError("M must be a rotation and a translation", where="M", found=str(R.tolist()))
     nearest = polar_factor(R)
     if np.abs(nearest - R).max() > ROUNDED:
@@ -264,7 +264,7 @@ def _rigid(M: FloatArray) -> FloatArray:
     return T
 
 
-def screws_from(
+def screws_from_rows(
     screws: ArrayLike,
     M: ArrayLike,
     *,
@@ -291,7 +291,7 @@ def screws_from(
         )
     if not (np.isfinite(S).all() and np.isfinite(T).all()):
         raise InputError("screws and M must be finite numbers", found="nan or inf")
-    T = _rigid(T)
+    T = _nearest_rigid(T)
     if frame == "body":
         w = S[:, :3] @ T[:3, :3].T
         S = np.hstack([w, S[:, 3:] @ T[:3, :3].T + np.cross(T[:3, 3], w)])
@@ -305,7 +305,7 @@ def screws_from(
     for i, name in enumerate(names):
         turns = bool(S[i, :3].any())
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
-        if abs(size - 1.0) > _WRITTEN:
+        if abs(size - 1.0) > _HANDWRITTEN_TOLERANCE:
             raise InputError(
                 f"the axis {'w' if turns else 'v'} of a screw must have length 1",
                 where=f"screw {i + 1}",
@@ -314,7 +314,7 @@ def screws_from(
             )
         S[i] /= size
         pitch = float(S[i, :3] @ S[i, 3:])
-        if abs(pitch) > _WRITTEN:
+        if abs(pitch) > _HANDWRITTEN_TOLERANCE:
             raise InputError(
                 "the screw of a joint must be a pure rotation or a pure translation",
                 where=f"screw {i + 1}",
@@ -326,7 +326,7 @@ def screws_from(
     return ProductOfExponentials(tuple(named), freeze(T), freeze(S), robot, base_frame, tip_frame)
 
 
-def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
+def screws_from_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     """Make screws from plain data with the keys M and "space" or "body"."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     check_keys([key for key in data if key != "lock"], known, "the table of screws")
@@ -337,7 +337,7 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
         )
     named = {key: data[key] for key in known[:4] if key in data}
     try:
-        return screws_from(data[frame], data["M"], frame=frame, **named)
+        return screws_from_rows(data[frame], data["M"], frame=frame, **named)
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise

@@ -27,10 +27,10 @@ from urdfkin.dh.table import (
     angle_difference,
     is_identity,
     nearest_twelfth,
-    wrapped,
+    wrap_angle,
 )
 from urdfkin.errors import InputError
-from urdfkin.errors.validators import real_number
+from urdfkin.errors.validators import as_finite_float
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, joints_between, make_chain
@@ -38,18 +38,18 @@ from urdfkin.model.configuration import axis_range, largest_value, sample_unifor
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
-LARGEST_TOLERANCE = math.pi / 36.0
-SAMPLES = 500
+MAX_SNAP_TOLERANCE = math.pi / 36.0
+SNAP_SAMPLES = 500
 #: Assumed range (rad or metres) of a mimicked joint that is not on the path.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest deviation of a cell that `noisy_cells` returns (rad, or relative to the table's span).
-_LARGEST_NOISE = 1e-4
+#: Largest deviation of a cell that `find_noisy_cells` returns (rad, or relative to the table's span).
+_MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
-def check_tolerance(snap: float) -> float:
-    tolerance = real_number(snap, "snap")
-    if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
+def check_snap_tolerance(snap: float) -> float:
+    tolerance = as_finite_float(snap, "snap")
+    if not 0.0 <= tolerance <= MAX_SNAP_TOLERANCE:
         raise InputError(
             "`snap` must be an angle in radians between 0 and 0.087 (5 degrees)", found=repr(snap)
         )
@@ -69,7 +69,7 @@ def snap_chain(
     for k, A in enumerate(constants):
         constants[k], angle = _snap_pose(A, tolerance)
         if angle:
-            changes.append((k, _change(exact, k + 1, f"direction of {names[k]}", angle)))
+            changes.append((k, _make_change(exact, k + 1, f"direction of {names[k]}", angle)))
     joints = [
         replace(joint, T_previous_joint=freeze(A))
         for joint, A in zip(path.joints, constants[:-1], strict=True)
@@ -81,14 +81,14 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
     """Snap theta of each row; a change of theta turns the rest of the chain about the row's axis."""
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
-        theta = wrapped(nearest_twelfth(row.theta)) + 0.0
+        theta = wrap_angle(nearest_twelfth(row.theta)) + 0.0
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
             # A prismatic axis may have been shifted to the origin of the previous joint.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
-            changes.append(replace(_change(exact, pivot, what, angle), row=i))
+            changes.append(replace(_make_change(exact, pivot, what, angle), row=i))
     return replace(table, rows=tuple(rows)), changes
 
 
@@ -97,12 +97,12 @@ def snap_report(
 ) -> SnapReport:
     per_metre = dict[str, float]()
     for change in changes:
-        for name in change.sliders:
+        for name in change.prismatic_joints:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
     travels = {row.joint: largest_value(row.limit) for row in table.rows}
-    metres = sum((change.tip for change in changes), 0.0)
+    metres = sum((change.tip_displacement for change in changes), 0.0)
     metres += sum(rate * travels[name] for name, rate in per_metre.items())
-    q = samples_within_limits(table)
+    q = sample_within_limits(table)
     T_exact, T_table = exact.placement(q), table.placement(q)
     distances = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
     angles = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
@@ -114,13 +114,13 @@ def snap_report(
         per_metre=per_metre,
         measured_metres=float(distances.max(initial=0.0)),
         measured_radians=float(angles.max(initial=0.0)),
-        samples=SAMPLES,
+        samples=SNAP_SAMPLES,
     )
 
 
-def samples_within_limits(table: DHTable) -> FloatArray:
+def sample_within_limits(table: DHTable) -> FloatArray:
     ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
-    return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
+    return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SNAP_SAMPLES)
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
@@ -155,7 +155,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
-    return _product(((2, yaw), (1, pitch), (0, roll)), tolerance)
+    return _multiply_rotations(((2, yaw), (1, pitch), (0, roll)), tolerance)
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
@@ -175,12 +175,12 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     else:
         phi, psi = math.atan2(R[0, 2], -R[1, 2]), math.atan2(R[2, 0], R[2, 1])
     pose = np.array(A)
-    pose[:3, :3] = _product(((2, phi), (0, tilt), (2, psi)), tolerance)
+    pose[:3, :3] = _multiply_rotations(((2, phi), (0, tilt), (2, psi)), tolerance)
     angle = float(rotation_angle(pose[:3, :3], R))
     return pose, (angle if angle > ROTATION_ROUNDINGS * EPS else 0.0)
 
 
-def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
+def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
     """Multiply rotations about coordinate axes, with each angle snapped within `tolerance`."""
     R = np.eye(3)
     for axis, angle in turns:
@@ -200,27 +200,27 @@ def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
     """Return a `SnapChange` for each snapped joint origin; its `lever` is the path length to the tip."""
-    changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
+    changes, lever, prismatic_joints = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
         offset = math.hypot(*joint.T_parent_joint[:3, 3])
         slides = joint.kind is JointKind.PRISMATIC
         lever += offset if backwards else 0.0
-        sliders += [joint.name] if slides and not backwards else []
+        prismatic_joints += [joint.name] if slides and not backwards else []
         if angle := rotations.get(joint.name, 0.0):
             before = moving - (joint.kind.has_axis and not backwards)
-            change = SnapChange(0, f"origin of {joint.name}", angle, lever, tuple(reversed(sliders)))
+            change = SnapChange(0, f"origin of {joint.name}", angle, lever, tuple(reversed(prismatic_joints)))
             changes.append((before, change))
-        sliders += [joint.name] if slides and backwards else []
+        prismatic_joints += [joint.name] if slides and backwards else []
         lever += 0.0 if backwards else offset
         moving -= joint.kind.has_axis
     return changes[::-1]
 
 
-def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
+def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
     """Return a `SnapChange` that rotates the chain after joint k (from 1) about the joint's origin."""
-    sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
-    return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
+    prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
+    return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
@@ -236,30 +236,32 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is DHConvention.STANDARD else k
 
 
-def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
+def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     """Return (joint, cell, deviation) for angles near multiples of 15 degrees, and lengths near 0."""
     noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
             deviation = abs(angle - nearest_twelfth(angle))
-            if ANGLE_ROUNDINGS * EPS < deviation <= _LARGEST_NOISE:
+            if ANGLE_ROUNDINGS * EPS < deviation <= _MAX_NOISE:
                 noisy.append((row.joint, name, deviation))
         for name, length in (("a", row.a), ("d", row.d)):
-            if 0.0 < abs(length) <= _LARGEST_NOISE * table.span:
+            if 0.0 < abs(length) <= _MAX_NOISE * table.span:
                 noisy.append((row.joint, name, abs(length)))
     return sorted(noisy, key=lambda cell: cell[2])
 
 
-def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
+def snap_hint(table: DHTable, make_snapped_table: Callable[[float], DHTable]) -> str | None:
     """Recommend the tolerance that leaves the fewest noisy cells; None if no tolerance helps.
 
     A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
     rounded, for example to 1.5708.
     """
-    noisy = noisy_cells(table) if table.snap is None else []
+    noisy = find_noisy_cells(table) if table.snap is None else []
     if not noisy:
         return None
-    counts = {tolerance: len(noisy_cells(snapped(tolerance))) for tolerance in _HINT_TOLERANCES}
+    counts = {
+        tolerance: len(find_noisy_cells(make_snapped_table(tolerance))) for tolerance in _HINT_TOLERANCES
+    }
     best = min(counts, key=lambda tolerance: counts[tolerance])
     if counts[best] >= len(noisy):
         return None

@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.derive import Choices, derive
-from urdfkin.dh.make import derive_like, reversed_like
+from urdfkin.dh.derive import DerivationOptions, derive
+from urdfkin.dh.make import derive_matching_table, find_reversed_joints
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
@@ -38,15 +38,18 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 #: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
-EXACT = 1e-9
+EXACT_TOLERANCE = 1e-9
 #: Smaller singular values count as zero; rounding errors are far below this number.
-_RANK = 1e-6
-_SAMPLES = 2000
-#: Default tolerance of `opw_of` (metres and rad).
-TOLERANCE = 1e-6
-SAMPLES = 200
-_H = math.pi / 2.0
-_ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
+_RANK_TOLERANCE = 1e-6
+_REACH_SAMPLES = 2000
+#: Default tolerance of `find_opw` (metres and rad).
+OPW_TOLERANCE = 1e-6
+OPW_SAMPLES = 200
+_RIGHT_ANGLE = math.pi / 2.0
+_ALPHA, _THETA = (
+    (-_RIGHT_ANGLE, 0.0, _RIGHT_ANGLE, -_RIGHT_ANGLE, _RIGHT_ANGLE, 0.0),
+    (0.0, -_RIGHT_ANGLE, _RIGHT_ANGLE, 0.0, 0.0, 0.0),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ class StructureKind:
 
     @property
     def is_exact(self) -> bool:
-        return self.radians <= EXACT and self.metres <= EXACT
+        return self.radians <= EXACT_TOLERANCE and self.metres <= EXACT_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,32 +106,32 @@ class Structure:
     pairs: tuple[AxisPair, ...]
     kinds: tuple[StructureKind, ...]
     reach: float
-    reached: float
+    sampled_reach: float
     reach_from: tuple[float, ...]
     reach_point: str
     solvers: tuple[str, ...]
 
 
-def structure(screws: ProductOfExponentials) -> Structure:
+def find_structure(screws: ProductOfExponentials) -> Structure:
     letters = "".join("R" if joint.kind.turns else "P" for joint in screws.joints)
-    pairs = tuple(_pair(screws, i) for i in range(len(letters) - 1))
-    kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
+    pairs = tuple(_make_pair(screws, i) for i in range(len(letters) - 1))
+    kinds = [*_find_triples(screws, letters, pairs), *_find_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
     tips, jacobian = _sample_tips(screws)
-    origin, reach_point = _origin(screws)
+    origin, reach_point = _find_origin(screws)
     return Structure(
         screws.robot,
         screws.base_frame,
         screws.tip_frame,
         letters,
-        int(np.linalg.matrix_rank(jacobian, tol=_RANK)) if letters else 0,
+        int(np.linalg.matrix_rank(jacobian, tol=_RANK_TOLERANCE)) if letters else 0,
         pairs,
         tuple(kinds),
         _reach_bound(screws, origin),
         float(np.linalg.norm(tips - origin, axis=-1).max()),
         tuple(origin.tolist()),
         reach_point,
-        tuple(_solvers(letters, kinds, pairs)),
+        tuple(_find_solvers(letters, kinds, pairs)),
     )
 
 
@@ -140,7 +143,7 @@ def _axis(screws: ProductOfExponentials, i: int) -> FloatArray:
     return w if w.any() else screws.space[i, 3:]
 
 
-def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
+def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
     z, following = _axis(screws, i), _axis(screws, i + 1)
     cross = np.cross(z, following)
     angle = math.atan2(float(np.linalg.norm(cross)), abs(float(z @ following)))
@@ -153,13 +156,13 @@ def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
     return AxisPair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
 
 
-def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
+def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
     """Return the least-squares intersection of axes, and the distance (m) of the farthest axis from it."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
         A, b = A + across, b + across @ screws.points[i]
-    point = np.asarray(np.linalg.lstsq(A, b, rcond=_RANK)[0], np.float64)
+    point = np.asarray(np.linalg.lstsq(A, b, rcond=_RANK_TOLERANCE)[0], np.float64)
     distances = [np.linalg.norm(np.cross(_axis(screws, i), point - screws.points[i])) for i in indices]
     return point, float(max(distances))
 
@@ -167,7 +170,9 @@ def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tup
 # -- kinds ---------------------------------------------------------------------------------------------
 
 
-def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair, ...]) -> list[StructureKind]:
+def _find_triples(
+    screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair, ...]
+) -> list[StructureKind]:
     found = []
     for i in range(len(letters) - 2):
         if letters[i : i + 3] != "RRR":
@@ -177,7 +182,7 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair,
         if tilt <= NEAR_ANGLE:
             found.append(StructureKind("three parallel axes", names, radians=tilt))
         elif min(pairs[i].angle, pairs[i + 1].angle) > NEAR_ANGLE:
-            point, distance = intersection(screws, (i, i + 1, i + 2))
+            point, distance = find_intersection(screws, (i, i + 1, i + 2))
             if distance <= NEAR_LENGTH:
                 place = "wrist" if i == len(letters) - 3 else "shoulder" if i == 0 else "joint"
                 at = tuple(point.tolist())
@@ -185,7 +190,7 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair,
     return found
 
 
-def _arm_kinds(
+def _find_arm_kinds(
     screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair, ...]
 ) -> list[StructureKind]:
     names = tuple(joint.name for joint in screws.joints)
@@ -199,7 +204,7 @@ def _arm_kinds(
     return []
 
 
-def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
+def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
     """Return the known closed-form solutions of an arm.
 
     If the arm has a required property only approximately, the solution is approximate too.
@@ -234,7 +239,7 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 # -- reach ---------------------------------------------------------------------------------------------
 
 
-def _origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
+def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
     """Return the point from which the reach is measured, in the base frame (m), and its description."""
     if not screws.joints or not screws.joints[0].kind.turns:
         return np.zeros(3), "the base's origin"
@@ -271,12 +276,12 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
-    values = sample_uniform(ranges, _SAMPLES)
+    values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Opw:
+class OpwParameters:
     """The OPW parameters of an arm; q_opw = sign * q - offset, where q are the URDF's joint values.
 
     `base` is the pose of the solver's base in the URDF's base. `tool` is the pose of the URDF's tip in the
@@ -321,29 +326,29 @@ class Opw:
         }
 
 
-def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
+def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameters:
     """Return the OPW parameters of a path; raise InputError if the path is not an OPW arm.
 
-    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations (metres and radians).
+    `tolerance` is the largest allowed error of the tip on `OPW_SAMPLES` configurations (metres and radians).
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
+    q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), OPW_SAMPLES)
     expected, best, reason = free.placement(q), None, ""
     for reference in _candidate_tables(path):
         try:
-            choices = Choices(flip=reversed_like(path, Choices(), reference))
+            options = DerivationOptions(flip=find_reversed_joints(path, DerivationOptions(), reference))
         except InputError as error:
             reason = reason or error.found or ""
             continue
-        opw = _parameters(derive_like(path, choices, reference))
+        opw = _read_parameters(derive_matching_table(path, options, reference))
         errors = np.abs(opw.placement(q) - expected)
         metres, radians = float(errors[..., :3, 3].max()), float(errors[..., :3, :3].max())
         fails = max(metres, radians) > tolerance
         negative = sum(opw.lengths[name] < 0.0 for name in ("c1", "c2", "c3", "c4"))
-        rank = (fails, max(metres, radians) if fails else negative, len(choices.flip))
+        rank = (fails, max(metres, radians) if fails else negative, len(options.flip))
         if best is None or rank < best[0]:
             best = rank, opw
             reason = f"an error of {metres * 1e3:.3g} mm and {radians:.3g} rad at the tip"
@@ -362,7 +367,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
     The lengths in the tables are approximately the arm's lengths.
     """
-    rows = derive(path, Choices(last="flange")).rows
+    rows = derive(path, DerivationOptions(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
     b = abs(rows[1].d) + abs(rows[2].d)
@@ -376,31 +381,31 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
         yield DHTable(DHConvention.STANDARD, tuple(opw_rows))
 
 
-def _parameters(table: DHTable) -> Opw:
+def _read_parameters(table: DHTable) -> OpwParameters:
     """Read the OPW parameters from a table.
 
-    `table` must be a result of `derive_like` with an OPW table as the reference.
+    `table` must be a result of `derive_matching_table` with an OPW table as the reference.
     """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
     offsets = (angle_difference(zero, row.theta) + 0.0 for zero, row in zip(_THETA, rows, strict=True))
     names, signs = tuple(row.joint for row in rows), tuple(row.sense for row in rows)
-    return Opw(names, lengths, tuple(offsets), signs, table.base, table.tool)
+    return OpwParameters(names, lengths, tuple(offsets), signs, table.base, table.tool)
 
 
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
 
     The first vector begins at the base, and the last vector ends at the tip. If two
-    consecutive axes have the same point in `_points`, the vector between them is exactly zero. Solvers use
-    this zero vector to detect that the axes intersect.
+    consecutive axes have the same point in `_shared_points`, the vector between them is exactly zero. Solvers
+    use this zero vector to detect that the axes intersect.
     """
-    points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
+    points = np.vstack([np.zeros(3), _shared_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
-def _points(screws: ProductOfExponentials) -> FloatArray:
+def _shared_points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
     If an axis has several intersections, an intersection of three axes has priority over one of two axes.
@@ -412,8 +417,8 @@ def _points(screws: ProductOfExponentials) -> FloatArray:
             indices = tuple(range(i, i + size))
             axes = screws.space[list(indices), :3]
             sines = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=-1)
-            point, distance = intersection(screws, indices)
-            if assigned.isdisjoint(indices) and sines.min() > NEAR_ANGLE and distance <= EXACT:
+            point, distance = find_intersection(screws, indices)
+            if assigned.isdisjoint(indices) and sines.min() > NEAR_ANGLE and distance <= EXACT_TOLERANCE:
                 points[list(indices)] = point
                 assigned.update(indices)
     return points

@@ -26,7 +26,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.units import Units, units_of
+from urdfkin.dh.units import Units, parse_units
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
@@ -35,7 +35,7 @@ from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, freeze, is_bounded, is_rigid
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 
 
 class DHConvention(StrEnum):
@@ -118,14 +118,14 @@ class DHRow:
         return (self.a, self.alpha, self.d, self.theta, self.beta)
 
     @property
-    def foot(self) -> float:
+    def distance_to_normal(self) -> float:
         """Distance (m) along the next axis between the row's x axis and the common normal.
 
         The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
         offset is |a sin(beta)| / sin^2(tilt); it is 0 if `beta` is 0.
 
         >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].foot
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].distance_to_normal
         0.0
         """
         across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
@@ -139,7 +139,7 @@ class DHRow:
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].X[:3, 3].tolist()
         [0.5, 0.0, 0.0]
         """
-        return between_axes(self.a, self.alpha, self.beta)
+        return link_transform(self.a, self.alpha, self.beta)
 
     @property
     def S(self) -> FloatArray:
@@ -149,16 +149,16 @@ class DHRow:
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].S[0].tolist()
         [1.0, -0.0, 0.0, 0.0]
         """
-        return along_axis(self.theta, self.d)
+        return joint_transform(self.theta, self.d)
 
 
 #: Largest deviation of a handwritten angle from a multiple of 15 degrees, as a fraction of 15 degrees.
-_WRITTEN = 1e-3
+_ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
-_TYPED = 1e-6
+_RIGID_TOLERANCE = 1e-6
 
 
-def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
+def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
     """Return S = Rz(theta) Tz(d) (..., 4, 4), radians and metres; the arguments broadcast."""
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
@@ -170,7 +170,7 @@ def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
     return S
 
 
-def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
+def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
     """Return the (4, 4) transform X = Tx(a) Rx(alpha) Ry(beta), metres and radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
@@ -186,13 +186,13 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
 
-    >>> as_a_and_alpha(between_axes(0.5, math.pi))
+    >>> as_a_and_alpha(link_transform(0.5, math.pi))
     (0.5, 3.141592653589793)
     """
     tilt_of_x = max(abs(T[0, 1]), abs(T[0, 2]))
     if tilt_of_x > ANGLE_ROUNDINGS * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
-    return float(T[0, 3]), cleaned_angle(math.atan2(T[2, 1], T[2, 2]))
+    return float(T[0, 3]), clean_angle(math.atan2(T[2, 1], T[2, 2]))
 
 
 def is_identity(T: FloatArray) -> bool:
@@ -204,21 +204,21 @@ def angle_difference(first: float, second: float) -> float:
     return math.remainder(first - second, 2.0 * math.pi)
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """Return the equivalent angle in (-pi, pi]; an angle that is -pi up to rounding becomes pi.
 
-    >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
+    >>> wrap_angle(-math.pi) == math.pi, wrap_angle(7.0) == 7.0 - 2 * math.pi
     (True, True)
     """
     equivalent = math.remainder(angle, 2.0 * math.pi)
     return math.pi if equivalent <= -math.pi * (1.0 - EPS) else equivalent
 
 
-def cleaned_angle(angle: float) -> float:
+def clean_angle(angle: float) -> float:
     """Wrap an angle into (-pi, pi]; a multiple of pi/12 with a rounding error becomes exact."""
-    angle = wrapped(angle)
+    angle = wrap_angle(angle)
     twelfth = nearest_twelfth(angle)
-    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE_ROUNDINGS * EPS else angle
+    return wrap_angle(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE_ROUNDINGS * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
@@ -229,7 +229,7 @@ def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
     """
-    return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _WRITTEN * twelfth
+    return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _ROUND_TOLERANCE * twelfth
 
 
 def nearest_twelfth(angle: float) -> float:
@@ -247,17 +247,18 @@ class SnapChange:
         angle: Angle (rad) of this rotation.
         lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
             zero.
-        sliders: Prismatic joints between the centre and the tip; their travel increases the distance.
+        prismatic_joints: Prismatic joints between the centre and the tip; their travel increases the
+        distance.
     """
 
     row: int
     what: str
     angle: float
     lever: float
-    sliders: tuple[str, ...] = ()
+    prismatic_joints: tuple[str, ...] = ()
 
     @property
-    def tip(self) -> float:
+    def tip_displacement(self) -> float:
         """Bound of the tip's displacement by this change (m), with prismatic joints at zero."""
         return self.angle * self.lever
 
@@ -300,7 +301,7 @@ class SnapReport:
 
         `values` contains the values of the prismatic joints by name.
         """
-        at_zero = sum(change.tip for change in self.changes)
+        at_zero = sum(change.tip_displacement for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
@@ -349,7 +350,7 @@ class DHTable(Displayable):
         object.__setattr__(self, "convention", convention_of(self.convention))
         for name in ("base", "tool"):
             object.__setattr__(
-                self, name, _rigid(getattr(self, name), f"{name} of the table of {self.robot}")
+                self, name, _check_pose(getattr(self, name), f"{name} of the table of {self.robot}")
             )
         names = [row.joint for row in self.rows]
         for name in names:
@@ -365,7 +366,7 @@ class DHTable(Displayable):
         return log_line(f"<DHTable {self.robot}: {ends}, {len(self.rows)} rows, {self.convention}>")
 
     def __str__(self) -> str:
-        return "\n".join(map(log_line, self._in_form("terminal", units_of()).split("\n")))
+        return "\n".join(map(log_line, self._export_text("terminal", parse_units()).split("\n")))
 
     def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in Markdown, for a README or an issue.
@@ -383,7 +384,7 @@ class DHTable(Displayable):
         >>> print(table.to_markdown("degrees", "millimetres").splitlines()[6])
         | 1 | `joint_1` | 500 | 0 | 0 | q1 |
         """
-        return self._in_form("markdown", units_of(angles, lengths, digits))
+        return self._export_text("markdown", parse_units(angles, lengths, digits))
 
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`.
@@ -392,7 +393,7 @@ class DHTable(Displayable):
         >>> "tabular" in urdfkin.load("planar_two_link").dh("tip", "base").to_latex()
         True
         """
-        return self._in_form("latex", units_of(angles, lengths, digits))
+        return self._export_text("latex", parse_units(angles, lengths, digits))
 
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in HTML, for a web page; arguments as in `to_markdown`.
@@ -402,10 +403,10 @@ class DHTable(Displayable):
         >>> "<table" in table.to_html()
         True
         """
-        return self._in_form("html", units_of(angles, lengths, digits))
+        return self._export_text("html", parse_units(angles, lengths, digits))
 
-    def _in_form(self, form: str, units: Units) -> str:
-        return str(hook("a table in a form")(self, form, units)).rstrip("\n")
+    def _export_text(self, form: str, units: Units) -> str:
+        return str(get_hook("a table in a form")(self, form, units)).rstrip("\n")
 
     def _repr_html_(self) -> str:
         return self.to_html()
@@ -535,7 +536,7 @@ class DHTable(Displayable):
         steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
             motion = ElementaryMotion(2, row.kind.turns)
-            constant = along_axis(0.0, row.d) if row.kind.turns else along_axis(row.theta, 0.0)
+            constant = joint_transform(0.0, row.d) if row.kind.turns else joint_transform(row.theta, 0.0)
             standard = self.convention is DHConvention.STANDARD
             steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
@@ -559,12 +560,12 @@ class DHTable(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :] @ self.tool)
 
 
-def _rigid(T: ArrayLike, where: str) -> FloatArray:
+def _check_pose(T: ArrayLike, where: str) -> FloatArray:
     pose = freeze(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
             "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"
         )
-    if not is_rigid(pose, _TYPED):
+    if not is_rigid(pose, _RIGID_TOLERANCE):
         raise InputError("a pose must be a rotation and a translation", where=where, found=str(pose.tolist()))
     return pose

@@ -21,19 +21,19 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import turned
+from urdfkin.compiled.plan import axis_pose
 from urdfkin.dh.common_normals import (
     AxisTransform,
     PoseTolerance,
     check_lengths,
-    cleaned_length,
+    clean_length,
+    find_axis_transform,
     pose_tolerance,
-    step_between,
-    tilt_of,
+    tilt_sine,
 )
-from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
+from urdfkin.dh.derive import RIGHT_ANGLE_TOLERANCE
 from urdfkin.dh.export.text import PrintedPrecision, format_sum
-from urdfkin.dh.table import along_axis, between_axes, cleaned_angle
+from urdfkin.dh.table import clean_angle, joint_transform, link_transform
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
@@ -82,8 +82,8 @@ class TreeParameters:
         path_lengths: (joints,) length (metres) of the URDF's path from the root to each joint's origin. The
             method `reach` adds the travel of prismatic joints.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: A tilt that may be a rounding error is set to zero. `left_out` is the largest sum (rad) of
-            such tilts on a path from the root.
+        zeroed_tilt: A tilt that may be a rounding error is set to zero. `zeroed_tilt` is the largest sum
+            (rad) of such tilts on a path from the root.
     """
 
     robot: str
@@ -91,7 +91,7 @@ class TreeParameters:
     rows: tuple[TreeRow, ...]
     path_lengths: FloatArray
     T_frame_link: FloatArray
-    left_out: float = 0.0
+    zeroed_tilt: float = 0.0
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
@@ -105,7 +105,7 @@ class TreeParameters:
         The estimate does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
-        return table_roundings(1 + longest) + self.left_out / EPS
+        return table_roundings(1 + longest) + self.zeroed_tilt / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
         """Return the (..., joints) path length (metres) from the root to each link at `q`.
@@ -151,15 +151,15 @@ class TreeParameters:
         frames = np.empty((*q.shape[:-1], len(self.rows), 4, 4))
         for j, row in enumerate(self.rows):
             T = np.eye(4) if row.antecedent < 0 else frames[..., row.antecedent, :, :]
-            constant = along_axis(row.gamma, row.b) @ between_axes(row.d, row.alpha, row.beta)
-            T = T @ constant @ along_axis(row.theta, row.r)
+            constant = joint_transform(row.gamma, row.b) @ link_transform(row.d, row.alpha, row.beta)
+            T = T @ constant @ joint_transform(row.theta, row.r)
             if row.sigma < 2:
                 T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
         return np.asarray(frames @ self.T_frame_link)
 
 
-def tree_parameters(tree: KinematicTree) -> TreeParameters:
+def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
     """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding."""
     check_lengths(tree.joints)
     for joint in tree.joints:
@@ -171,18 +171,19 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
                 " of this joint",
             )
     lengths = _path_lengths(tree)
-    links = _links(tree, lengths)
-    steps, offsets = _steps(tree, links, lengths)
+    links = _find_link_axes(tree, lengths)
+    steps, offsets = _find_transforms(tree, links, lengths)
     rows = tuple(
-        _row(tree, j, links[j].antecedent, steps[j], offsets, lengths[j]) for j in range(len(tree.joints))
+        _make_row(tree, j, links[j].antecedent, steps[j], offsets, lengths[j])
+        for j in range(len(tree.joints))
     )
     poses = [
-        np.linalg.inv(along_axis(*offsets.get(j, (0.0, 0.0)))) @ link.T_link_axis.T
+        np.linalg.inv(joint_transform(*offsets.get(j, (0.0, 0.0)))) @ link.T_link_axis.T
         for j, link in enumerate(links)
     ]
     T_frame_link = freeze(np.reshape(poses, (-1, 4, 4)))
-    left_out = max((link.left_out for link in links), default=0.0)
-    return TreeParameters(tree.name, tree.links[0], rows, freeze(lengths), T_frame_link, left_out)
+    zeroed_tilt = max((link.zeroed_tilt for link in links), default=0.0)
+    return TreeParameters(tree.name, tree.links[0], rows, freeze(lengths), T_frame_link, zeroed_tilt)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,35 +191,35 @@ class _LinkAxis:
     """The axis frame of a link, with z along the axis of the link's joint.
 
     `T_antecedent_axis` is the pose in the antecedent's axis frame. `T_link_axis` is the pose in the link's
-    URDF frame. Small tilts on the path from the root to the link are set to zero. `left_out` is the sum (rad)
-    of these tilts.
+    URDF frame. Small tilts on the path from the root to the link are set to zero. `zeroed_tilt` is the sum
+    (rad) of these tilts.
     """
 
     antecedent: int
     T_antecedent_axis: FloatArray
     T_link_axis: FloatArray
     noise: PoseTolerance
-    left_out: float
+    zeroed_tilt: float
 
 
-def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
+def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
     links = list[_LinkAxis]()
     # Each link has its antecedent, T_antecedent_link, and the number of fixed joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
-        align = turned(joint)
+        align = axis_pose(joint)
         T_axis = T @ joint.T_parent_joint @ align
-        noise, tilt = pose_tolerance(folded + 1, 0.0, length), tilt_of(T_axis)
-        left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
-        left_out += tilt if tilt <= noise.radians else 0.0
-        links.append(_LinkAxis(antecedent, T_axis, align, noise, left_out))
+        noise, tilt = pose_tolerance(folded + 1, 0.0, length), tilt_sine(T_axis)
+        zeroed_tilt = links[antecedent].zeroed_tilt if antecedent >= 0 else 0.0
+        zeroed_tilt += tilt if tilt <= noise.radians else 0.0
+        links.append(_LinkAxis(antecedent, T_axis, align, noise, zeroed_tilt))
         carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, T_axis, folded + 1))
     return links
 
 
-def _steps(
+def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
@@ -233,8 +234,8 @@ def _steps(
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))
-        step = step_between(link.T_antecedent_axis, length, phi, hayati=True, noise=link.noise)
-        if abs(cleaned_angle(step.phi - phi)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
+        step = find_axis_transform(link.T_antecedent_axis, length, phi, hayati=True, noise=link.noise)
+        if abs(clean_angle(step.phi - phi)) > np.pi / 2.0 + RIGHT_ANGLE_TOLERANCE:
             step = step.with_reversed_x()
         if defines_x:
             offsets[i] = (step.phi, step.delta)
@@ -246,7 +247,7 @@ def _steps(
     return steps, offsets
 
 
-def _row(
+def _make_row(
     tree: KinematicTree,
     j: int,
     i: int,
@@ -263,13 +264,13 @@ def _row(
         link=tree.links[j + 1],
         antecedent=i,
         sigma=_SIGMA[joint.kind],
-        gamma=cleaned_angle(step.phi - phi),
-        b=cleaned_length(step.delta - delta, length),
+        gamma=clean_angle(step.phi - phi),
+        b=clean_length(step.delta - delta, length),
         alpha=step.alpha + 0.0,
         d=step.a + 0.0,
         beta=step.beta + 0.0,
-        theta=cleaned_angle(step.phi_next + own_phi),
-        r=cleaned_length(step.delta_next + own_delta, length),
+        theta=clean_angle(step.phi_next + own_phi),
+        r=clean_length(step.delta_next + own_delta, length),
         leader=rule.leader if rule else joint.name,
         multiplier=rule.multiplier if rule else 1.0,
         offset=rule.offset if rule else 0.0,
@@ -298,7 +299,7 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
     }
 
 
-def document(table: TreeParameters, units: Units) -> TextDocument:
+def tree_document(table: TreeParameters, units: Units) -> TextDocument:
     angle, length = units.angle_name, units.length_name
     heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
     heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]", f"beta [{angle}]"]
@@ -310,16 +311,16 @@ def document(table: TreeParameters, units: Units) -> TextDocument:
 
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
-    theta, r = units.angle(row.theta), units.length(row.r)
+    theta, r = units.format_angle(row.theta), units.format_length(row.r)
     # The constant in a mimic joint's cell includes the offset of the mimic rule.
     variable = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
-        theta = format_sum(variable, units.angle(row.theta + row.offset))
+        theta = format_sum(variable, units.format_angle(row.theta + row.offset))
     elif row.sigma == 1:
-        r = format_sum(variable, units.length(row.r + row.offset))
-    cells = [str(j), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
-    cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
-    return [*cells, units.angle(row.beta)]
+        r = format_sum(variable, units.format_length(row.r + row.offset))
+    cells = [str(j), row.joint, str(row.antecedent + 1), str(row.sigma), units.format_angle(row.gamma)]
+    cells += [units.format_length(row.b), units.format_angle(row.alpha), units.format_length(row.d), theta, r]
+    return [*cells, units.format_angle(row.beta)]
 
 
 def as_csv(table: TreeParameters) -> str:
@@ -332,23 +333,23 @@ def as_csv(table: TreeParameters) -> str:
     return csv_text(lines)
 
 
-def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
+def measure_printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
     """Compare the link positions of a printed and an exact table at `q` (n, coordinates)."""
-    again = replace(table, rows=tuple(_printed_tree_row(row, units) for row in table.rows))
+    again = replace(table, rows=tuple(_round_tree_row(row, units) for row in table.rows))
     distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))
 
 
-def _printed_tree_row(row: TreeRow, units: Units) -> TreeRow:
+def _round_tree_row(row: TreeRow, units: Units) -> TreeRow:
     theta_offset, r_offset = (row.offset if row.sigma == kind else 0.0 for kind in (0, 1))
     return replace(
         row,
-        gamma=units.printed_angle(row.gamma),
-        b=units.printed_length(row.b),
-        alpha=units.printed_angle(row.alpha),
-        d=units.printed_length(row.d),
-        beta=units.printed_angle(row.beta),
-        theta=units.printed_angle(row.theta + theta_offset) - theta_offset,
-        r=units.printed_length(row.r + r_offset) - r_offset,
+        gamma=units.round_angle(row.gamma),
+        b=units.round_length(row.b),
+        alpha=units.round_angle(row.alpha),
+        d=units.round_length(row.d),
+        beta=units.round_angle(row.beta),
+        theta=units.round_angle(row.theta + theta_offset) - theta_offset,
+        r=units.round_length(row.r + r_offset) - r_offset,
         multiplier=float(f"{row.multiplier:.10g}"),
     )

@@ -17,16 +17,16 @@ from fractions import Fraction
 from numbers import Real
 
 from urdfkin.errors import InputError
-from urdfkin.errors.numbers import UNITS, in_radians
+from urdfkin.errors.numbers import UNITS, radians_from_degrees
 from urdfkin.errors.validators import safe_repr
 
 
-class Angles(StrEnum):
+class AngleUnit(StrEnum):
     RADIANS = "radians"
     DEGREES = "degrees"
 
 
-class Lengths(StrEnum):
+class LengthUnit(StrEnum):
     METRES = "metres"
     MILLIMETRES = "millimetres"
 
@@ -35,66 +35,66 @@ class Lengths(StrEnum):
 #: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
-_LONGEST = 200
+_MAX_CELL_LENGTH = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
     """Format of printed numbers; exact multiples of pi/12 in radians are written as fractions of pi."""
 
-    angles: Angles = Angles.RADIANS
-    lengths: Lengths = Lengths.METRES
+    angles: AngleUnit = AngleUnit.RADIANS
+    lengths: LengthUnit = LengthUnit.METRES
     digits: int = 10
     columns: tuple[str, ...] = COLUMNS
 
     @property
-    def counts_millimetres(self) -> bool:
-        return self.lengths is Lengths.MILLIMETRES
+    def uses_millimetres(self) -> bool:
+        return self.lengths is LengthUnit.MILLIMETRES
 
     @property
     def angle_name(self) -> str:
-        return "rad" if self.angles is Angles.RADIANS else "deg"
+        return "rad" if self.angles is AngleUnit.RADIANS else "deg"
 
     @property
     def length_name(self) -> str:
-        return "m" if self.lengths is Lengths.METRES else "mm"
+        return "m" if self.lengths is LengthUnit.METRES else "mm"
 
-    def angle(self, radians: float, pi: str = "pi") -> str:
+    def format_angle(self, radians: float, pi: str = "pi") -> str:
         """Format an angle (rad); `pi` is the text for pi."""
         fraction = pi_fraction(radians)
-        if self.angles is Angles.DEGREES:
-            return str(fraction * 180) if fraction is not None else self._number(math.degrees(radians))
+        if self.angles is AngleUnit.DEGREES:
+            return str(fraction * 180) if fraction is not None else self._format_number(math.degrees(radians))
         if fraction is None:
-            return self._number(radians)
-        return fraction_text(fraction, pi)
+            return self._format_number(radians)
+        return format_pi_fraction(fraction, pi)
 
-    def length(self, metres: float) -> str:
+    def format_length(self, metres: float) -> str:
         """Format a length.
 
-        >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
+        >>> Units(lengths=LengthUnit.MILLIMETRES).format_length(0.0825)
         '82.5'
         """
-        return self._number(metres if self.lengths is Lengths.METRES else metres * 1000.0)
+        return self._format_number(metres if self.lengths is LengthUnit.METRES else metres * 1000.0)
 
-    def printed_angle(self, radians: float) -> float:
+    def round_angle(self, radians: float) -> float:
         """Return the angle (rad) that a reader of the printed angle gets."""
-        text = self.angle(radians)
-        number = read_number(text, "printed")
-        return number if "pi" in text else cell_in_si("theta", number, self)
+        text = self.format_angle(radians)
+        number = parse_number(text, "printed")
+        return number if "pi" in text else convert_to_si("theta", number, self)
 
-    def printed_length(self, metres: float) -> float:
+    def round_length(self, metres: float) -> float:
         """Return the length (m) that a reader of the printed length gets."""
-        return cell_in_si("d", read_number(self.length(metres), "printed"), self)
+        return convert_to_si("d", parse_number(self.format_length(metres), "printed"), self)
 
-    def _number(self, value: float) -> str:
+    def _format_number(self, value: float) -> str:
         return f"{value:.{self.digits}g}" if value else "0"
 
 
-def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
+def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
     """Return units from their names (also rad, deg, m and mm); raise InputError for an unknown name."""
     try:
         angles, lengths = (_UNIT_NAMES.get(name, name) for name in (angles, lengths))
-        return Units(Angles(angles), Lengths(lengths), digits)
+        return Units(AngleUnit(angles), LengthUnit(lengths), digits)
     except (ValueError, TypeError):
         raise InputError(
             "unknown unit",
@@ -110,7 +110,7 @@ def pi_fraction(radians: float) -> Fraction | None:
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
 
-def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
+def format_pi_fraction(fraction: Fraction, pi: str = "pi") -> str:
     """Format a multiple of pi: 0, pi, -pi/2, 5pi/12."""
     if fraction == 0:
         return "0"
@@ -118,10 +118,10 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
     return f"{count}{pi}" + (f"/{fraction.denominator}" if fraction.denominator != 1 else "")
 
 
-def read_number(value: object, where: str) -> float:
+def parse_number(value: object, where: str) -> float:
     """Parse a number, or the text of a number or of a multiple of pi."""
     try:
-        number = _number(value)
+        number = _parse_number(value)
     except (ValueError, TypeError, OverflowError, ZeroDivisionError):
         raise InputError(
             "this is not a number", where=where, found=safe_repr(value), remedy="write 1.5708 or pi/2"
@@ -131,7 +131,7 @@ def read_number(value: object, where: str) -> float:
     return number
 
 
-def _number(value: object) -> float:
+def _parse_number(value: object) -> float:
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, str):
@@ -142,11 +142,11 @@ def _number(value: object) -> float:
     return cell.number
 
 
-def cell_in_si(name: str, number: float, units: Units) -> float:
+def convert_to_si(name: str, number: float, units: Units) -> float:
     """Convert the cell `name` to metres or radians; 90 degrees become exactly math.pi / 2."""
     if name in ("a", "d"):
-        return number / 1000.0 if units.counts_millimetres else number
-    return number if units.angles is Angles.RADIANS else in_radians(number)
+        return number / 1000.0 if units.uses_millimetres else number
+    return number if units.angles is AngleUnit.RADIANS else radians_from_degrees(number)
 
 
 _PLAIN_TEXT = str.maketrans(
@@ -210,10 +210,10 @@ class Cell:
         return f"{self.number!r} {self.unit or ''}"
 
 
-def plain_text(text: str) -> str:
+def to_plain_text(text: str) -> str:
     r"""Convert a text with symbols or LaTeX to plain letters.
 
-    >>> plain_text("−π/2"), plain_text(r"$\frac{\pi}{2} + \theta_{1}$").split(), plain_text("θ₁*")
+    >>> to_plain_text("−π/2"), to_plain_text(r"$\frac{\pi}{2} + \theta_{1}$").split(), to_plain_text("θ₁*")
     ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
     """
     for pattern, plain in _LATEX:
@@ -227,9 +227,9 @@ def parse_cell(original: str) -> Cell:
     >>> parse_cell("-q2 + 90°")
     Cell(number=90.0, unit='deg', factor=-1.0, variable=2, text='90')
     """
-    if len(original) > _LONGEST:
+    if len(original) > _MAX_CELL_LENGTH:
         raise InvalidCellError(f"a cell of {len(original)} characters")
-    text = plain_text(original)
+    text = to_plain_text(original)
     text = "var" if text == "*" else text
     terms = _parse_terms(text[1:-1] if text.startswith("(") and text.endswith(")") else text)
     variables = [term for term in terms if term.variable]

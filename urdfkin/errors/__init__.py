@@ -16,34 +16,36 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Maximum number of leading characters of a name that `nearest` compares.
-_COMPARED = 128
-WORK = 1_000_000
-_OFFERED = 3
+#: Maximum number of leading characters of a name that `find_similar_names` compares.
+_MAX_COMPARED_CHARACTERS = 128
+MAX_COMPARISONS = 1_000_000
+_MAX_SUGGESTIONS = 3
 
 
-def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
+def find_similar_names(
+    word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_COMPARISONS
+) -> list[str]:
     """Return up to three known names that look like `word`, the most similar first.
 
     `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
     `work` compared pairs of characters.
 
-    >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
+    >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
     """
-    prefix = word[:_COMPARED]
+    prefix = word[:_MAX_COMPARED_CHARACTERS]
     matcher = difflib.SequenceMatcher(b=prefix)
     found = []
-    for name in known:
-        matcher.set_seq1(name[:_COMPARED])
+    for name in valid_names:
+        matcher.set_seq1(name[:_MAX_COMPARED_CHARACTERS])
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
-        work -= len(prefix) * len(name[:_COMPARED])
+        work -= len(prefix) * len(name[:_MAX_COMPARED_CHARACTERS])
         if work < 0:
             break
         if (similarity := matcher.ratio()) >= cutoff:
             found.append((similarity, name))
-    return [name for _, name in heapq.nlargest(_OFFERED, found)]
+    return [name for _, name in heapq.nlargest(_MAX_SUGGESTIONS, found)]
 
 
 class QuestionsSection(Enum):
@@ -143,10 +145,10 @@ class UrdfkinError(Exception):
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
         # `validate --jobs` pickles errors, and Python's own `__reduce__` loses keyword arguments.
-        return _rebuild, (type(self), self.__dict__)
+        return _unpickle_error, (type(self), self.__dict__)
 
 
-def _rebuild(cls: type[_E], state: dict[str, Any]) -> _E:
+def _unpickle_error(cls: type[_E], state: dict[str, Any]) -> _E:
     error = cls.__new__(cls, state["what"])
     error.args = (state["what"],)
     error.__dict__.update(state)
@@ -194,13 +196,13 @@ class UnknownNameError(UrdfkinError, LookupError):
         self,
         kind: str,
         name: str,
-        known: Iterable[str],
+        valid_names: Iterable[str],
         *,
         where: str | None = None,
         question: QuestionsSection | None = None,
     ) -> None:
-        names = sorted(set(known))
-        close = nearest(name, names, cutoff=0.5)
+        names = sorted(set(valid_names))
+        close = find_similar_names(name, names, cutoff=0.5)
         if close:
             remedy = f"did you mean {', '.join(close)}?"
         elif names:

@@ -9,13 +9,20 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
+from urdfkin.errors.escape import (
+    escape_unprintable,
+    latex_text,
+    log_line,
+    markdown_cell,
+    markdown_code,
+    markdown_text,
+)
 
 #: Characters that draw the branches of a tree before a name.
-LINES = "├│└ "
-ASCII = str.maketrans("├│└", "+|`")
+TREE_LINES = "├│└ "
+ASCII_TREE_LINES = str.maketrans("├│└", "+|`")
 #: Numbers below this fraction of the table's largest number are displayed as 0.
-NOISE = 1e-15
+NOISE_FRACTION = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +45,14 @@ class Table:
     def cells(self) -> list[list[str]]:
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
         return [
-            [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
+            [x if isinstance(x, str) else format_number(x, NOISE_FRACTION * largest) for x in row]
+            for row in self.rows
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
         """Split each heading and cell into two texts: leading characters such as `├─`, and the rest."""
         return [
-            [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
+            [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
             for row in (self.heads, *self.cells())
         ]
 
@@ -87,7 +95,10 @@ class Table:
     def latex(self) -> str:
         sides = "".join("l" if self.is_left(i) else "r" for i in range(len(self.heads)))
         rows = [
-            " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
+            " & ".join(
+                lines.translate(ASCII_TREE_LINES).replace(" ", "~") + latex_text(words)
+                for lines, words in row
+            )
             + r" \\"
             for row in self._split_cells()
         ]
@@ -154,38 +165,40 @@ class TextDocument:
     title: str
     parts: Sequence[str | Table | Matrix] = ()
 
-    def written(self, form: str) -> str:
+    def render(self, form: str) -> str:
         text: str = self.text() if form in ("terminal", "table") else getattr(self, form)()
         return text + "\n"
 
     def text(self) -> str:
-        return self._joined("text", "\n", log_line, log_line)
+        return self._render_parts("text", "\n", log_line, log_line)
 
     def markdown(self) -> str:
         def sentence(words: str) -> str:
             return markdown_code(words) if isinstance(words, CodeLine) else markdown_text(words)
 
-        return self._joined("markdown", "\n\n", sentence, lambda title: f"**{markdown_text(title)}**")
+        return self._render_parts("markdown", "\n\n", sentence, lambda title: f"**{markdown_text(title)}**")
 
     def html(self) -> str:
-        body = self._joined(
+        body = self._render_parts(
             "html", "\n", lambda x: f"<p>{_html(x)}</p>", lambda x: f"<p><b>{_html(x)}</b></p>"
         )
         return f"<div>\n{body}\n</div>"
 
     def latex(self) -> str:
-        return self._joined("latex", "\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}")
+        return self._render_parts(
+            "latex", "\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}"
+        )
 
-    def _joined(
-        self, form: str, between: str, sentence: Callable[[str], str], title: Callable[[str], str]
+    def _render_parts(
+        self, form: str, separator: str, sentence: Callable[[str], str], title: Callable[[str], str]
     ) -> str:
-        def one(part: str | Table | Matrix) -> str:
+        def render_part(part: str | Table | Matrix) -> str:
             if isinstance(part, str):
                 return title(part) if isinstance(part, Strong) else sentence(part)
             return str(getattr(part, form)())
 
-        parts = [one(part) for part in self.parts if part or form == "text"]
-        return between.join([title(self.title), *parts] if self.title else parts)
+        parts = [render_part(part) for part in self.parts if part or form == "text"]
+        return separator.join([title(self.title), *parts] if self.title else parts)
 
 
 class Displayable:
@@ -193,30 +206,30 @@ class Displayable:
 
     __slots__ = ()
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         raise NotImplementedError
 
     def __str__(self) -> str:
-        return self._sheet().text()
+        return self._text_document().text()
 
     def _repr_html_(self) -> str:
-        return self._sheet().html()
+        return self._text_document().html()
 
     def _repr_markdown_(self) -> str:
-        return self._sheet().markdown()
+        return self._text_document().markdown()
 
     def _repr_latex_(self) -> str:
-        return self._sheet().latex()
+        return self._text_document().latex()
 
 
 def _html(words: str) -> str:
-    return escape(printable(words))
+    return escape(escape_unprintable(words))
 
 
-def six_digits(value: float, noise: float = NOISE, digits: int = 6) -> str:
+def format_number(value: float, noise: float = NOISE_FRACTION, digits: int = 6) -> str:
     """Format a number with `digits` significant digits; absolute values up to `noise` become "0".
 
-    >>> six_digits(0.1 + 0.2), six_digits(1e-16), six_digits(1e-16, noise=0.0)
+    >>> format_number(0.1 + 0.2), format_number(1e-16), format_number(1e-16, noise=0.0)
     ('0.3', '0', '1e-16')
     """
     return "0" if abs(value) <= noise else f"{value:.{digits}g}"

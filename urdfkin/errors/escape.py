@@ -14,17 +14,17 @@ from collections.abc import Iterable
 from typing import Any
 
 #: First characters of a spreadsheet cell that make the cell a formula.
-FORMULA = ("=", "+", "-", "@")
+FORMULA_STARTS = ("=", "+", "-", "@")
 #: Pattern of a command of Azure or TeamCity, anywhere in a line; group 1 is the character to escape.
-COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
+CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
 #: Patterns of the commands of all CI services; GitHub's commands are at the beginning of a line.
-COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
+CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: Invisible character (word joiner) that keeps Markdown from making a link, a mention or an issue number.
-_JOINER = "&#8288;"
+_WORD_JOINER = "&#8288;"
 
 
-def printable(text: str) -> str:
+def escape_unprintable(text: str) -> str:
     """Escape unprintable characters and line ends, so that the line is safe for a terminal."""
     if text.isprintable():
         return text
@@ -37,9 +37,9 @@ def log_line(text: str) -> str:
     >>> print(log_line("::error::a\n##vso[b]"))
     :\u003aerror::a\n##vso\u005bb]
     """
-    line = printable(text)
-    for command in COMMANDS:
-        line = command.sub(lambda found: found[0][:-1] + escape(found[1]), line)
+    line = escape_unprintable(text)
+    for command in CI_COMMANDS:
+        line = command.sub(lambda found: found[0][:-1] + escape_sequence(found[1]), line)
     return line
 
 
@@ -50,15 +50,15 @@ def markdown_text(words: str) -> str:
 
 def markdown_cell(words: str) -> str:
     """Escape text for a cell of a Markdown table, in which no list or horizontal rule can begin."""
-    flat = printable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
+    flat = escape_unprintable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())
-    return re.sub(r"(?i)(@|\\#|:(?=//)|www(?=\.)|(?:mailto|xmpp):)", rf"\1{_JOINER}", flat)
+    return re.sub(r"(?i)(@|\\#|:(?=//)|www(?=\.)|(?:mailto|xmpp):)", rf"\1{_WORD_JOINER}", flat)
 
 
 def markdown_code(name: str) -> str:
     """Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell."""
-    return "`" + (printable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
+    return "`" + (escape_unprintable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
 
 _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
@@ -69,7 +69,7 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 
 
 def latex_text(text: str) -> str:
-    return "".join(_LATEX.get(character, character) for character in printable(text))
+    return "".join(_LATEX.get(character, character) for character in escape_unprintable(text))
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
@@ -93,7 +93,7 @@ def json_text(data: Any) -> str:
     return text.replace("##", r"#\u0023").replace("\x7f", r"\u007f")
 
 
-def escape(c: str) -> str:
+def escape_sequence(c: str) -> str:
     """Return the escape sequence of a character in Python and TOML.
 
     For characters up to U+FFFF, JSON has the same escape sequence.
@@ -109,8 +109,8 @@ def csv_cell(name: str) -> str:
     >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
     ("'=cmd|'/C calc'!A0", 'joint1')
     """
-    line = printable(name).replace("##", r"#\x23")
-    return f"'{line}" if line.lstrip("' ").startswith(FORMULA) else line
+    line = escape_unprintable(name).replace("##", r"#\x23")
+    return f"'{line}" if line.lstrip("' ").startswith(FORMULA_STARTS) else line
 
 
 def csv_value(text: str) -> str:
@@ -124,4 +124,4 @@ def csv_value(text: str) -> str:
 
 def from_csv_cell(cell: str) -> str:
     """Return the name from a cell that `csv_cell` wrote; escaped characters stay escaped."""
-    return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell
+    return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA_STARTS) else cell

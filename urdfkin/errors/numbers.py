@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 #: Pattern of a decimal number; matching takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_WHOLE = re.compile(r"[+-]?[0-9]+")
+_INTEGER = re.compile(r"[+-]?[0-9]+")
 #: Maximum number of characters of a number, because Python converts long integers in quadratic time.
-_LONGEST = 2000
+_MAX_LENGTH = 2000
 
 #: Pairs of a pattern and a remedy; the first pattern that matches a text determines the remedy.
 _REMEDIES = (
@@ -35,7 +35,7 @@ def parse_float(text: str) -> float | None:
     [-0.0015, None, None, None, None]
     """
     text = text.strip(" \t\r\n")
-    if len(text) > _LONGEST or not DECIMAL.fullmatch(text):
+    if len(text) > _MAX_LENGTH or not DECIMAL.fullmatch(text):
         return None
     value = float(text)
     return value if math.isfinite(value) else None
@@ -48,10 +48,10 @@ def parse_int(text: str) -> int | None:
     (12, None, None, None)
     """
     text = text.strip(" \t\r\n")
-    return int(text) if len(text) <= _LONGEST and _WHOLE.fullmatch(text) else None
+    return int(text) if len(text) <= _MAX_LENGTH and _INTEGER.fullmatch(text) else None
 
 
-def remedy(text: str) -> str | None:
+def number_remedy(text: str) -> str | None:
     text = text.strip(" \t\r\n")
     found = (words for pattern, words in _REMEDIES if re.fullmatch(pattern, text, re.IGNORECASE | re.DOTALL))
     return next(found, None)
@@ -69,8 +69,8 @@ _QUANTITY = re.compile(
     rf"(?P<sign>[+-]?)\s*(?P<factors>{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s*pi)*)"
     r"\s*(?P<unit>[a-z]+)?\s*(?P<per>/\s*s\s*(?:\^?\s*2|/\s*s)?)?"
 )
-_STEP = re.compile(rf"\s*([*/]?)\s*({_FACTOR})")
-_LONGEST_QUANTITY = 200
+_OPERATOR_AND_FACTOR = re.compile(rf"\s*([*/]?)\s*({_FACTOR})")
+_MAX_QUANTITY_LENGTH = 200
 
 
 class ParsedNumber(NamedTuple):
@@ -96,7 +96,7 @@ def parse_quantity(text: str) -> ParsedNumber | None:
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
-    if len(plain) > _LONGEST_QUANTITY or (found := _QUANTITY.fullmatch(plain)) is None:
+    if len(plain) > _MAX_QUANTITY_LENGTH or (found := _QUANTITY.fullmatch(plain)) is None:
         return None
     unit = UNITS.get(found["unit"]) if found["unit"] else None
     value = _product(found["factors"])
@@ -107,7 +107,7 @@ def parse_quantity(text: str) -> ParsedNumber | None:
             return None
         unit = "rad"
     value = -value if found["sign"] == "-" else value
-    value = in_radians(value) if unit == "deg" else value / 1000.0 if unit == "mm" else value
+    value = radians_from_degrees(value) if unit == "deg" else value / 1000.0 if unit == "mm" else value
     per = re.sub(r"[\s^]", "", found["per"] or "")
     return ParsedNumber(
         value, {"deg": "rad", "mm": "m"}.get(unit or "", unit), 2 if len(per) > 2 else len(per) // 2
@@ -116,7 +116,7 @@ def parse_quantity(text: str) -> ParsedNumber | None:
 
 def _product(factors: str) -> float | None:
     value = 1.0
-    for sign, factor in _STEP.findall(factors):
+    for sign, factor in _OPERATOR_AND_FACTOR.findall(factors):
         number = math.pi if factor == "pi" else float(factor)
         if sign == "/" and not number:
             return None
@@ -124,7 +124,7 @@ def _product(factors: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def in_radians(degrees: float) -> float:
+def radians_from_degrees(degrees: float) -> float:
     """Convert degrees to radians. For k * 15 degrees, the result is exactly k * pi / 12 in floating point."""
     twelfths = degrees / 15.0
     return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(degrees)

@@ -11,10 +11,10 @@ from typing import Any, TypeGuard
 from urdfkin.errors import InputError
 
 
-def whole_number(value: object, name: str, least: int, most: float = math.inf) -> int:
+def as_int(value: object, name: str, least: int, most: float = math.inf) -> int:
     """Return `value` as an int from `least` to `most`.
 
-    >>> whole_number(True, "threads", 1)
+    >>> as_int(True, "threads", 1)
     Traceback (most recent call last):
     urdfkin.errors.InputError: threads must be a whole number, at least 1: found True
     """
@@ -28,10 +28,10 @@ def whole_number(value: object, name: str, least: int, most: float = math.inf) -
     return number
 
 
-def real_number(value: object, name: str) -> float:
+def as_finite_float(value: object, name: str) -> float:
     """Return `value` as a finite float.
 
-    >>> real_number(1, "snap")
+    >>> as_finite_float(1, "snap")
     1.0
     """
     if not is_real(value) or not math.isfinite(number := as_float(value)):

@@ -4,7 +4,7 @@ The exported code allocates no memory and has no global variables. Each function
 computes one configuration, or `LANES` configurations together. In the arrays of the straight-line code,
 consecutive numbers of one configuration are `L` elements apart. Here, `L` is 1 for one configuration, and
 `LANES` for `LANES` configurations. If `L` is `LANES`, a compiler turns each line of code into vector
-instructions. The templates in the folder `frames/` contain the code that all robots share.
+instructions. The templates in the folder `templates/` contain the code that all robots share.
 """
 
 from __future__ import annotations
@@ -17,14 +17,18 @@ from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
-_FRAMES = Path(__file__).with_name("frames")
-_FAST = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
+_TEMPLATES = Path(__file__).with_name("templates")
+_FAST_FLAGS = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
 _PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
     """Return a C file; if the macro `NAME_DECLARATIONS` is defined, only declarations are compiled."""
-    return c_file(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
+    return c_file(
+        code,
+        comment_block(_header_lines(code)),
+        "\n".join([*test_vector_lines(code), main_program(code, "check_one.c")]),
+    )
 
 
 def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
@@ -41,29 +45,29 @@ def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
 
 def fill_template(name: str, /, **texts: str | int) -> str:
     """Return a template in which `texts[name]` replaces each placeholder `@name@`."""
-    template = (_FRAMES / name).read_text(encoding="utf-8")
+    template = (_TEMPLATES / name).read_text(encoding="utf-8")
     return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 
 
-def literal(x: float) -> str:
+def format_literal(x: float) -> str:
     return f"R({x!r})"
 
 
-def comment(lines: Sequence[str]) -> str:
+def comment_block(lines: Sequence[str]) -> str:
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
-def _head(code: FrameCode) -> list[str]:
+def _header_lines(code: FrameCode) -> list[str]:
     name, up = code.name, code.name.upper()
     return [
-        *code.head,
+        *code.header,
         "",
         f"To try it:     cc -std=c99 -O2 -D{up}_MAIN {name}.c -lm && ./a.out",
-        f"To compile it: cc -std=c99 {_FAST} -c {name}.c",
+        f"To compile it: cc -std=c99 {_FAST_FLAGS} -c {name}.c",
         f"In float:      add -D{up}_REAL=float",
         f'To call it:    #define {up}_DECLARATIONS, then #include "{name}.c"',
         f"CMake:         add_library({name} STATIC {name}.c)",
-        f"               target_compile_options({name} PRIVATE {_FAST})",
+        f"               target_compile_options({name} PRIVATE {_FAST_FLAGS})",
         f"               target_link_libraries({name} PUBLIC m)",
         f"               target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})",
         f"pkg-config:    Name: {name}",
@@ -73,20 +77,20 @@ def _head(code: FrameCode) -> list[str]:
     ]
 
 
-def what(function: Function) -> str:
+def describe_result(function: Function) -> str:
     """Return the shape of a result and its equations, as in "4 x 4, eq. 7.77"."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
-def parameters(function: Function, real: str) -> str:
+def parameter_list(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
 def _declarations(code: FrameCode) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        declared = parameters(function, f"{code.name.upper()}_REAL")
-        yield f"/* {what(function)} */"
+        declared = parameter_list(function, f"{code.name.upper()}_REAL")
+        yield f"/* {describe_result(function)} */"
         yield f"void {code.name}_{function.name}({declared});"
         yield f"void {code.name}_{function.name}_batch(size_t n, {declared});"
 
@@ -95,7 +99,7 @@ def _declarations(code: FrameCode) -> Iterator[str]:
 
 
 def _function(code: FrameCode, function: Function) -> str:
-    writer, layout = Writer(code, function, literal, sine=False), InputLayout(function)
+    writer, layout = Writer(code, function, format_literal, sine=False), InputLayout(function)
     widths = code.widths(function)
 
     def lines(lines_: Iterable[str], indent: str = "    ") -> str:
@@ -105,19 +109,19 @@ def _function(code: FrameCode, function: Function) -> str:
         "function.c",
         name=function.name,
         title=code.name,
-        operations=function.operations,
-        parameters=parameters(function, "real"),
+        operations=function.operation_count,
+        parameters=parameter_list(function, "real"),
         count=len(function.results),
         size=layout.size,
-        inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
+        inputs=", ".join(f"{x.op}[{x.operands[0]}]" for x in layout.inputs) or "R(0.0)",
         unused=lines(f"(void){x};" for x in widths),
-        lines=lines(_lines(writer, layout)),
-        sines=lines(_sines(writer, layout)),
-        reads=lines(_reads(layout, widths)),
-        lane_sines=lines(_lane_sines(writer, layout)),
-        reserve=reserve(code, function),
+        lines=lines(_body_lines(writer, layout)),
+        sines=lines(_sine_lines(writer, layout)),
+        reads=lines(_read_lines(layout, widths)),
+        lane_sines=lines(_lane_sine_lines(writer, layout)),
+        reserve=count_reserved(code, function),
         passed=", ".join(widths),
-        advance=advance(code, function),
+        advance=advance_pointers(code, function),
         advance_m=lines((f"{x} += m * {width};" for x, width in widths.items()), " " * 8),
         copies=", ".join(f"own_{x}[LANES * {width} + 8] = {{R(0.0)}}" for x, width in widths.items()),
         copy=lines(
@@ -132,13 +136,13 @@ def _function(code: FrameCode, function: Function) -> str:
     )
 
 
-def reserve(code: FrameCode, function: Function) -> int:
+def count_reserved(code: FrameCode, function: Function) -> int:
     """Return the least number of configurations whose arrays, if not empty, have eight or more numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
 
-def advance(code: FrameCode, function: Function) -> str:
+def advance_pointers(code: FrameCode, function: Function) -> str:
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
@@ -156,13 +160,13 @@ class InputLayout:
 
     def index(self, node: Node) -> int:
         if node.op in ("sin", "cos"):
-            return self.index(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
+            return self.index(node.operands[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
             return self.first + self.angles.index(node)
         return self.inputs.index(node)
 
 
-def _lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
+def _body_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     for node in writer.inputs:
         yield f"const real {writer.names[node]} = in[{layout.index(node)} * L];"
     for head, lines in writer.statements():
@@ -171,36 +175,36 @@ def _lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     yield from (f"out[{k} * L] = {value};" for k, value in enumerate(writer.results()))
 
 
-def _sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
+def _sine_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     count = len(layout.angles)
-    yield from (f"{angle};" for angle in _computed_angles(writer, layout, "in[{}]"))
+    yield from (f"{angle};" for angle in _computed_angle_lines(writer, layout, "in[{}]"))
     for k in range(layout.first, layout.first + count):
         yield f"in[{k + count}] = sin(in[{k}]);"
         yield f"in[{k + 2 * count}] = cos(in[{k}]);"
 
 
-def _computed_angles(writer: Writer, layout: InputLayout, at: str) -> Iterator[str]:
+def _computed_angle_lines(writer: Writer, layout: InputLayout, at: str) -> Iterator[str]:
     for node in layout.computed_angles:
-        value = writer.expanded(node, lambda x: at.format(layout.index(x)))
+        value = writer.expand(node, lambda x: at.format(layout.index(x)))
         yield f"{at.format(layout.index(node))} = {value}"
 
 
-def _reads(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
+def _read_lines(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
     for x, width in widths.items():
         for first in range(0, width, 8):
-            found = [node for node in layout.inputs if node.op == x and node.of[0] // 8 == first // 8]
+            found = [node for node in layout.inputs if node.op == x and node.operands[0] // 8 == first // 8]
             if found:
                 yield f"{{ eight x[8]; columns({x} + {first}, {width}, x);"
                 for node in found:
-                    yield f"  put(in + {layout.index(node)} * LANES, x + {node.of[0] % 8});"
+                    yield f"  put(in + {layout.index(node)} * LANES, x + {node.operands[0] % 8});"
                 yield "}"
         yield f"(void){x};"
     yield "(void)in;"
 
 
-def _lane_sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
+def _lane_sine_lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     if count := len(layout.angles):
-        for assignment in _computed_angles(writer, layout, "in[{} * LANES + k]"):
+        for assignment in _computed_angle_lines(writer, layout, "in[{} * LANES + k]"):
             yield f"for (int k = 0; k < LANES; ++k) {assignment};"
         arrays = (f"in + {layout.first + k * count} * LANES" for k in range(3))
         yield f"sines_cosines({', '.join(arrays)}, {count});"
@@ -209,7 +213,7 @@ def _lane_sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
 # -- the test vectors of a function ------------------------------------------------------------------------
 
 
-def vectors(code: FrameCode) -> Iterator[str]:
+def test_vector_lines(code: FrameCode) -> Iterator[str]:
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
     for k, letter in enumerate(code.inputs):
@@ -218,8 +222,8 @@ def vectors(code: FrameCode) -> Iterator[str]:
     for function in code.functions:
         size = f"{function.name}[{n}][{len(function.results)}]"
         yield _array(f"true_{size}", [vector.results[function.name] for vector in found])
-        yield _array(f"within_{size}", [vector.within[function.name] for vector in found])
-        yield _array(f"single_{size}", [vector.single[function.name] for vector in found])
+        yield _array(f"within_{size}", [vector.tolerances[function.name] for vector in found])
+        yield _array(f"single_{size}", [vector.single_tolerances[function.name] for vector in found])
 
 
 def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
@@ -237,13 +241,13 @@ def _numbers(values: Sequence[str]) -> str:
     return "\n".join([*lines, line.rstrip(",")])
 
 
-def main(code: FrameCode, *frames: str) -> str:
-    """Return a program that runs the test vectors; `frames` are templates such as "check_one.c"."""
-    checks = (_check(code, function, frame) for function in code.functions for frame in frames)
+def main_program(code: FrameCode, *templates: str) -> str:
+    """Return a program that runs the test vectors; `templates` are templates such as "check_one.c"."""
+    checks = (_check(code, function, template) for function in code.functions for template in templates)
     return fill_template("check.c", checks="".join(checks))
 
 
-def _check(code: FrameCode, function: Function, frame: str) -> str:
+def _check(code: FrameCode, function: Function, template: str) -> str:
     widths, n = code.widths(function), len(code.proof.vectors)
     sizes = {x: max(1, width) for x, width in widths.items()}
 
@@ -254,7 +258,7 @@ def _check(code: FrameCode, function: Function, frame: str) -> str:
         )
 
     return fill_template(
-        frame,
+        template,
         title=code.name,
         UP=code.name.upper(),
         name=function.name,

@@ -21,14 +21,14 @@ from pathlib import Path
 
 from urdfkin.errors import InputError
 from urdfkin.system.files import read_text
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 
 #: Text in the first lines of every exported file.
-MARK = "straight-line code for this robot and frame"
+EXPORT_MARK = "straight-line code for this robot and frame"
 _ZEROS = "0" * 64
 #: Line of the header in which `seal` replaces the zeros by the digest.
 SEAL = f"Seal sha256 {_ZEROS}"
-_SEALED = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
+_SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
@@ -40,23 +40,23 @@ _COMPILE = {
 }
 #: Compiler and options for a CUDA file that runs on a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `MARK` and the word UNVERIFIED.
-_HEAD = 2000
+#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
+_HEADER_LENGTH = 2000
 #: Time limit (s) of a command; a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 
 def seal(text: str) -> str:
     """Replace the 64 zeros in the file's header by the digest."""
-    return _SEALED.sub(lambda found: found[1] + _digest(text), text, count=1)
+    return _SEAL_LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 
-def _is_sealed(text: str) -> bool | None:
+def _has_valid_seal(text: str) -> bool | None:
     """Return whether the file's digest is correct; None without a digest."""
     text = text.replace("\r\n", "\n")
-    if (found := _SEALED.search(text)) is None:
+    if (found := _SEAL_LINE.search(text)) is None:
         return None
-    return _digest(_SEALED.sub(lambda line: line[1] + _ZEROS, text, count=1)) == found[2]
+    return _digest(_SEAL_LINE.sub(lambda line: line[1] + _ZEROS, text, count=1)) == found[2]
 
 
 def _digest(text: str) -> str:
@@ -65,15 +65,15 @@ def _digest(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FileCheck:
-    """Result of a check; `doubts` are the reasons why the file is not verified."""
+    """Result of a check; `warnings` are the reasons why the file is not verified."""
 
     lines: tuple[str, ...]
-    good: bool
-    doubts: tuple[str, ...]
+    passed: bool
+    warnings: tuple[str, ...]
 
     @property
     def verified(self) -> bool:
-        return not self.doubts
+        return not self.warnings
 
 
 def check(file: Path) -> FileCheck:
@@ -82,7 +82,7 @@ def check(file: Path) -> FileCheck:
     Raise InputError if the file is not an export or does not run here, and SourceError if it cannot be read.
     """
     text = read_text(file)
-    if MARK not in text[:_HEAD]:
+    if EXPORT_MARK not in text[:_HEADER_LENGTH]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
     runs = {**dict.fromkeys(_COMPILE, _run_compiled), ".py": _run_imported, ".m": _run_octave}
     if (run := runs.get(file.suffix)) is None:
@@ -96,13 +96,13 @@ def check(file: Path) -> FileCheck:
         lines = tuple(run(file, text, Path(folder)))
     if not lines:
         raise InputError("the file has no test vectors", where=str(file))
-    return FileCheck(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
+    return FileCheck(lines, all(line.startswith("good ") for line in lines), tuple(_find_warnings(text)))
 
 
-def _doubts(text: str) -> Iterator[str]:
-    if "UNVERIFIED" in text[:_HEAD]:
+def _find_warnings(text: str) -> Iterator[str]:
+    if "UNVERIFIED" in text[:_HEADER_LENGTH]:
         yield "these expressions were not compared with Pinocchio when they were written"
-    sealed = _is_sealed(text)
+    sealed = _has_valid_seal(text)
     if sealed is None:
         yield (
             "the file has no seal (checksum), so changes of the file cannot be detected; export the file"
@@ -121,10 +121,10 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
 
     Without a GPU, only the CPU functions of a CUDA file are checked.
     """
-    name = _name_of_program(_MAIN, text, file)
+    name = _find_program_name(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
     command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
-    compiler = _program(command[0], file)
+    compiler = _find_program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
         program = folder / real
@@ -135,17 +135,17 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
 def _run_imported(file: Path, text: str, folder: Path) -> Iterator[str]:
     copy = _copy(text, folder / "checked.py")
     code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
-    yield from _run(own_python(code), file, cwd=folder)
+    yield from _run(python_command(code), file, cwd=folder)
 
 
 def _run_octave(file: Path, text: str, folder: Path) -> Iterator[str]:
-    name = _name_of_program(_FUNCTION, text, file)
+    name = _find_program_name(_FUNCTION, text, file)
     _copy(text, folder / f"{name}.m")
-    octave = [_program("octave-cli", file), "--no-init-file", "--no-site-file"]
+    octave = [_find_program("octave-cli", file), "--no-init-file", "--no-site-file"]
     yield from _run([*octave, "--eval", f"{name}().check();"], file, cwd=folder)
 
 
-def _name_of_program(pattern: re.Pattern[str], text: str, file: Path) -> str:
+def _find_program_name(pattern: re.Pattern[str], text: str, file: Path) -> str:
     if (found := pattern.search(text)) is None:
         raise InputError("the file has no test vectors", where=str(file))
     return found[1]
@@ -156,7 +156,7 @@ def _copy(text: str, path: Path) -> Path:
     return path
 
 
-def _program(name: str, file: Path) -> str:
+def _find_program(name: str, file: Path) -> str:
     if (found := shutil.which(name)) is None:
         raise InputError(f"{name} is needed to check this file and is not installed", where=str(file))
     return found

@@ -10,11 +10,11 @@ from urdfkin.compiled.plan import CompiledTree, StepField
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_names, as_str
 from urdfkin.export import recursion
-from urdfkin.export.check import MARK, SEAL
+from urdfkin.export.check import EXPORT_MARK, SEAL
 from urdfkin.export.expression import Node, Number
-from urdfkin.export.function import Function, function_of
-from urdfkin.export.naming import all_safe, comment_name, comment_text, title
-from urdfkin.export.proof import Proof, prove
+from urdfkin.export.function import Function, make_function
+from urdfkin.export.naming import comment_name, comment_text, function_prefix, unique_safe_names
+from urdfkin.export.proof import Proof, make_proof
 from urdfkin.model.configuration import coordinate_names, velocity_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
@@ -70,11 +70,11 @@ class FrameCode:
         return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
 
     @property
-    def head(self) -> list[str]:
+    def header(self) -> list[str]:
         """Lines of a file's header; the first line marks unverified code."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
-        about = f"Kinematics of {subject}: {MARK}."
+        about = f"Kinematics of {subject}: {EXPORT_MARK}."
         verified = self.proof.certificate.verified
         lines = [
             *([about, "", verdict] if verified else [verdict, about, ""]),
@@ -93,7 +93,7 @@ class FrameCode:
         return [*lines, *([""] if self.about else []), *self.about]
 
 
-def code_of(
+def make_verified_code(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
@@ -107,7 +107,7 @@ def code_of(
     """Return the code of a frame, compared with Pinocchio, with test vectors."""
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
-    rows = _exported_quantities(quantities)
+    rows = _parse_quantities(quantities)
     if not tree.nv and any(row.columns for row in rows):
         raise InputError(
             "the Jacobian has no columns",
@@ -115,15 +115,15 @@ def code_of(
             found="no moving joint",
             remedy="export the placement instead",
         )
-    prefix = title("", name) if name else title(tree.name, frame)
-    code = unverified_code(tree, plan, frame, rows, reference, prefix)
-    proof = prove(verifier, plan_of, frame, reference, code.functions, verify)
+    prefix = function_prefix("", name) if name else function_prefix(tree.name, frame)
+    code = make_unverified_code(tree, plan, frame, rows, reference, prefix)
+    proof = make_proof(verifier, plan_of, frame, reference, code.functions, verify)
     code = replace(code, maybe_proof=proof, about=tuple(map(comment_text, about.splitlines())))
 
     def exact() -> FrameCode:
-        from urdfkin.export.exact import exact_functions
+        from urdfkin.export.exact import make_exact_functions
 
-        functions, exact_proof = exact_functions(
+        functions, exact_proof = make_exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify
         )
         return replace(code, functions=functions, maybe_proof=exact_proof, exact=None)
@@ -131,7 +131,7 @@ def code_of(
     return replace(code, exact=exact)
 
 
-def unverified_code(
+def make_unverified_code(
     tree: KinematicTree,
     plan: CompiledTree,
     frame: str,
@@ -147,26 +147,26 @@ def unverified_code(
         robot=comment_name(tree.name),
         frame=comment_name(frame),
         reference=reference,
-        functions=tuple(function_of(plan, row, reference) for row in rows),
+        functions=tuple(make_function(plan, row, reference) for row in rows),
         coordinates=tuple(map(comment_name, coordinates)),
         rates=tuple(map(comment_name, rates)),
         joints=tuple(map(comment_name, joints)),
-        identifiers={letter: all_safe(found) for letter, found in names.items()},
+        identifiers={letter: unique_safe_names(found) for letter, found in names.items()},
     )
 
 
-def exported() -> list[Quantity]:
+def exportable_quantities() -> list[Quantity]:
     return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
 
 
-def _exported_quantities(names: Collection[str]) -> list[Quantity]:
+def _parse_quantities(names: Collection[str]) -> list[Quantity]:
     checked = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
     rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
-    possible = ", ".join(row.method for row in exported())
+    possible = ", ".join(row.method for row in exportable_quantities())
     if not rows:
         raise InputError("no quantity to export", remedy=f"name some of {possible}")
     for row in rows:
-        if row not in exported():
+        if row not in exportable_quantities():
             raise InputError(f"the {row.name} cannot be exported", remedy=f"choose among {possible}")
     return rows
 
@@ -185,39 +185,39 @@ class Writer:
         self.code, self.function, self.literal = code, function, literal
         self.variables = set(function.statements)
         self.leaves = () if sine else ("sin", "cos")
-        self.needed = function.needed_without(self.leaves)
+        self.dependencies = function.dependencies_without(self.leaves)
         self.names = {node: self._name(node, k) for k, node in enumerate(function.nodes)}
 
     def _name(self, node: Node, k: int) -> str:
         identifiers = self.code.identifiers
         if node.op in identifiers:
-            return f"{node.op}_{identifiers[node.op][node.of[0]]}"
-        if node.op in ("sin", "cos") and node.place >= 0:
-            return f"{node.op[0]}_{identifiers['s'][node.place]}"
+            return f"{node.op}_{identifiers[node.op][node.operands[0]]}"
+        if node.op in ("sin", "cos") and node.step >= 0:
+            return f"{node.op[0]}_{identifiers['s'][node.step]}"
         return node.name or f"t{k}"
 
     @property
     def inputs(self) -> list[Node]:
         leaves = (*self.code.identifiers, *self.leaves)
-        return [node for node in self.function.nodes if node.op in leaves and node in self.needed]
+        return [node for node in self.function.nodes if node.op in leaves and node in self.dependencies]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
         """For each joint of the path, yield a comment and a list of assignments (name, value)."""
-        nodes = [x for x in self.function.statements if x in self.needed and x.op not in self.leaves]
-        for place, group in groupby(nodes, key=lambda node: node.place):
+        nodes = [x for x in self.function.statements if x in self.dependencies and x.op not in self.leaves]
+        for step, group in groupby(nodes, key=lambda node: node.step):
             assigned = list(group)
             equations = dict.fromkeys(n for x in assigned for n in x.equation.split(", ") if n)
             lines = [(self.names[node], self.value(node)) for node in assigned]
-            yield ": ".join(filter(None, (self._place(place), ", ".join(equations)))), lines
+            yield ": ".join(filter(None, (self._describe_step(step), ", ".join(equations)))), lines
 
-    def _place(self, place: int) -> str:
+    def _describe_step(self, step: int) -> str:
         joints, steps = self.code.joints, self.function.plan.steps
-        if place < 0:
+        if step < 0:
             return "constants"
-        if place < len(joints):
-            kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[place, StepField.KIND]]
-            return f"{joints[place]} {kind}"
-        return self.code.frame if place == len(joints) else "results"
+        if step < len(joints):
+            kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[step, StepField.KIND]]
+            return f"{joints[step]} {kind}"
+        return self.code.frame if step == len(joints) else "results"
 
     def results(self) -> list[str]:
         return [self.text(x) for x in self.function.results]
@@ -232,23 +232,23 @@ class Writer:
 
     def value(self, x: Node, precedence: int = _SUM) -> str:
         if x.op in ("sin", "cos", "sqrt"):
-            return f"{x.op}({self.text(x.of[0])})"
+            return f"{x.op}({self.text(x.operands[0])})"
         return _arithmetic(x, self.text, precedence)
 
-    def expanded(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
+    def expand(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
         """Return an expression as text, with inputs and constants instead of variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.identifiers:
             return input_text(x)
-        return _arithmetic(x, lambda y, level: self.expanded(y, input_text, level), precedence)
+        return _arithmetic(x, lambda y, level: self.expand(y, input_text, level), precedence)
 
 
 def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) -> str:
     if x.op == "neg":
-        own, result = _SIGN, f"-{text(x.of[0], _PRODUCT)}"
+        own, result = _SIGN, f"-{text(x.operands[0], _PRODUCT)}"
     else:
         own = _PRECEDENCE[x.op]
         # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
-        result = f"{text(x.of[0], own)} {x.op} {text(x.of[1], own + 1)}"
+        result = f"{text(x.operands[0], own)} {x.op} {text(x.operands[1], own + 1)}"
     return result if own >= precedence else f"({result})"

@@ -26,20 +26,20 @@ from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 
-from urdfkin.compiled.evaluate import in_blocks, is_staged
-from urdfkin.compiled.kernel_cache import compiling
-from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
-from urdfkin.compiled.prepared import Fast
+from urdfkin.compiled.evaluate import compute_in_blocks, uses_buffer
+from urdfkin.compiled.kernel_cache import compile_lock
+from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, aligned_empty
+from urdfkin.compiled.prepared import FastFunction
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.export.c import InputLayout, advance, c_file, fill_template, reserve
-from urdfkin.export.code import FrameCode, unverified_code
-from urdfkin.export.proof import CHECKED
+from urdfkin.export.c import InputLayout, advance_pointers, c_file, count_reserved, fill_template
+from urdfkin.export.code import FrameCode, make_unverified_code
+from urdfkin.export.proof import PROOF_SAMPLES
 from urdfkin.model.configuration import draw_samples, warn_of_degrees
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.cache import cache_folder, get, put
-from urdfkin.system.locks import importing, lock_over_forks
+from urdfkin.system.cache import make_cache_folder, read_cached_file, write_cached_file
+from urdfkin.system.locks import import_lock, make_fork_safe_lock
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
@@ -48,14 +48,14 @@ _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-e
 #: By default, GCC uses half of the width of vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
-_names = count()
+_load_counter = count()
 
 
 class NoCompilerError(Exception):
     """There is no C compiler, or the compiler rejects the code."""
 
 
-def library(code: FrameCode) -> ctypes.CDLL:
+def load_library(code: FrameCode) -> ctypes.CDLL:
     """Compile code that consists of one function, and load it, or raise NoCompilerError.
 
     The argument of the library's entry point `task` is an array with the fields of `KernelArgs`. The result
@@ -65,20 +65,22 @@ def library(code: FrameCode) -> ctypes.CDLL:
         raise NoCompilerError("cc is not installed")
     text = c_file(code) + _entry_point(code)
     flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
-    folder = cache_folder("library", [], text, *flags, _version(compiler), _processor())
-    data = get(folder / "machine.code") if folder else None
+    folder = make_cache_folder(
+        "library", [], text, *flags, _compiler_version(compiler), _processor_features()
+    )
+    data = read_cached_file(folder / "machine.code") if folder else None
     if data is None:
         data = _compile(text, [compiler, *flags])
         if folder:
-            put(folder / "machine.code", data)
-    return _load(data)
+            write_cached_file(folder / "machine.code", data)
+    return _load_code(data)
 
 
 def _entry_point(code: FrameCode) -> str:
     (function,) = code.functions
     widths, layout = code.widths(function), InputLayout(function)
     spread = (
-        f"    for (int k = 0; k < LANES; ++k) in[{i} * LANES + k] = {x.op}[{x.of[0]}];"
+        f"    for (int k = 0; k < LANES; ++k) in[{i} * LANES + k] = {x.op}[{x.operands[0]}];"
         for i, x in enumerate(layout.inputs)
     )
     lines = {
@@ -96,7 +98,7 @@ def _entry_point(code: FrameCode) -> str:
         "library.c",
         N=int(KernelArgs.N),
         OUT=int(KernelArgs.OUT),
-        STAGE=int(KernelArgs.STAGE),
+        STAGE=int(KernelArgs.BUFFER),
         title=code.name,
         name=function.name,
         passed=", ".join(widths),
@@ -104,8 +106,8 @@ def _entry_point(code: FrameCode) -> str:
         size=layout.size,
         spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
-        reserve=reserve(code, function),
-        advance=advance(code, function),
+        reserve=count_reserved(code, function),
+        advance=advance_pointers(code, function),
         **texts,
     )
 
@@ -129,10 +131,10 @@ def _compile(text: str, command: list[str]) -> bytes:
         return library.read_bytes()
 
 
-def _load(data: bytes) -> ctypes.CDLL:
+def _load_code(data: bytes) -> ctypes.CDLL:
     if not hasattr(os, "memfd_create"):  # macOS cannot load a library from memory.
         with tempfile.TemporaryDirectory() as folder:
-            library = Path(folder, f"robot{next(_names)}.so")
+            library = Path(folder, f"robot{next(_load_counter)}.so")
             library.write_bytes(data)
             return ctypes.CDLL(str(library))
     descriptor = os.memfd_create("urdfkin", os.MFD_CLOEXEC)
@@ -141,11 +143,11 @@ def _load(data: bytes) -> ctypes.CDLL:
         file.flush()
         # The loader identifies a library by its path, but a later library can get the same descriptor.
         # Therefore each path contains a different number of "./".
-        return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
+        return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
 @cache
-def _version(compiler: str) -> str:
+def _compiler_version(compiler: str) -> str:
     done = subprocess.run(
         [compiler, "--version"], capture_output=True, text=True, errors="replace", check=False
     )
@@ -153,7 +155,7 @@ def _version(compiler: str) -> str:
 
 
 @cache
-def _processor() -> str:
+def _processor_features() -> str:
     """Return the processor's features, on which the option `-march=native` depends."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -163,14 +165,14 @@ def _processor() -> str:
 
 
 #: Maximum number of results. The results of eight configurations then need at most half a megabyte of stack.
-_MOST_RESULTS = 8192
+_MAX_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
-    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
+    int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.BUFFER, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
 _Arguments = ctypes.c_int64 * len(KernelArgs)
 _DOUBLE = np.dtype(np.float64)
-_compiling = lock_over_forks()
+_compiling = make_fork_safe_lock()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
@@ -191,11 +193,11 @@ class _ExportedRobot(Protocol):
     @property
     def compute(self) -> Callable[..., FloatArray]: ...
     @property
-    def compiled(self) -> Callable[..., CompiledFrame]: ...
+    def compile(self) -> Callable[..., CompiledFrame]: ...
 
 
 class CompiledFrame:
-    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compiled`.
+    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compile`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
@@ -209,7 +211,7 @@ class CompiledFrame:
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
-    >>> fast, q = robot.compiled("tool0"), robot.sample(1000)
+    >>> fast, q = robot.compile("tool0"), robot.sample(1000)
     >>> fast.jacobian(q).shape
     (1000, 6, 6)
     """
@@ -218,18 +220,18 @@ class CompiledFrame:
         self.frame, self.reference = frame, reference
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
-        self._batches: dict[str, Callable[[int], int] | None] = {}
+        self._machine_codes: dict[str, Callable[[int], int] | None] = {}
         # The first call of each function compiles the machine code, or reads it from the cache.
-        self._placement: Fast = partial(self._first, "placement")
-        self._velocity: Fast = partial(self._first, "velocity")
-        self._jacobian: Fast = partial(self._first, "jacobian")
-        self._jacobian_rate: Fast = partial(self._first, "jacobian rate")
-        self._hessian: Fast = partial(self._first, "hessian")
-        self._acceleration: Fast = partial(self._first, "acceleration")
+        self._placement: FastFunction = partial(self._compute_first, "placement")
+        self._velocity: FastFunction = partial(self._compute_first, "velocity")
+        self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
+        self._jacobian_rate: FastFunction = partial(self._compute_first, "jacobian rate")
+        self._hessian: FastFunction = partial(self._compute_first, "hessian")
+        self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
         # Memory addresses are not valid in another process, so unpickling creates a new object.
-        return self._robot.compiled, (self.frame, self.reference)
+        return self._robot.compile, (self.frame, self.reference)
 
     def placement(
         self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
@@ -237,7 +239,7 @@ class CompiledFrame:
         """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
@@ -256,7 +258,7 @@ class CompiledFrame:
         """Return the velocity (..., 6), [linear; angular], m/s and rad/s: eq. 7.127, 7.128.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.velocity([0.0, 0.0], [1.0, 0.0]).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
@@ -270,7 +272,7 @@ class CompiledFrame:
         """Return the Jacobian (..., 6, nv): eq. 7.85.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian([0.0, 0.0])[1].tolist()
         [0.9, 0.4]
         """
@@ -289,7 +291,7 @@ class CompiledFrame:
         """Return the time derivative of the Jacobian (..., 6, nv): eq. 7.126.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.jacobian_rate([0.0, 0.0], [1.0, 0.0])[0].tolist()
         [-0.9, -0.4]
         """
@@ -303,7 +305,7 @@ class CompiledFrame:
         """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.hessian([0.0, 0.0])[0].tolist()
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
@@ -323,7 +325,7 @@ class CompiledFrame:
         """Return the classical acceleration (..., 6), [linear; angular], m/s^2, rad/s^2: eq. 7.129, 7.130.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0])[0].item()
         -0.9
         """
@@ -331,18 +333,18 @@ class CompiledFrame:
             return one
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
-    def _first(self, name: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called
+    def _compute_first(self, name: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
+        with compile_lock, import_lock:
+            from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
         # The fast function checks neither the norm of a quaternion nor the range of the results.
         needs_checks = self._tree.floating_joints or self._plan.is_large
-        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
-        compute, task = called(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
+        compute, task = wrap_c_function(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
@@ -351,27 +353,27 @@ class CompiledFrame:
 
     def _machine_code(self, row: Quantity) -> Any:
         with _compiling:
-            if row.name not in self._batches:
-                self._batches[row.name] = self._make(row)
-            return self._batches[row.name]
+            if row.name not in self._machine_codes:
+                self._machine_codes[row.name] = self._make_machine_code(row)
+            return self._machine_codes[row.name]
 
-    def _make(self, row: Quantity) -> Any:
+    def _make_machine_code(self, row: Quantity) -> Any:
         verifier = self._robot.verifier
-        code = unverified_code(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
-        if not 0 < len(code.functions[0].results) <= _MOST_RESULTS:
+        code = make_unverified_code(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
+        if not 0 < len(code.functions[0].results) <= _MAX_RESULTS:
             return None
         try:
-            task = library(code).task
+            task = load_library(code).task
         except NoCompilerError:
             return None
         task.argtypes, task.restype = [ctypes.c_void_p], ctypes.c_int64
-        drawn = draw_samples(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
-        call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
+        samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
+        call = self._make_call((samples.q, samples.v, samples.a)[: len(row.inputs)])
         result = call.in_shape(self._run_call(task, row, call, None, 1))
         verifier.check(row, call, result, verifier.policy_of_call(None))
         return task
 
-    def _call(self, inputs: Sequence[ConfigurationLike]) -> Call:
+    def _make_call(self, inputs: Sequence[ConfigurationLike]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
 
     def _compute_batch(
@@ -389,7 +391,7 @@ class CompiledFrame:
                 warn_of_degrees(self._tree, inputs[0])
                 self._robot.verifier.ledger.unchecked(name, len(out))
                 return out
-        call = self._call(inputs)
+        call = self._make_call(inputs)
         to = call.flat(out, row.own_shape(self._tree.nv))
         result = call.compute(self._run_call, task, row, call, to, threads)
         self._robot.verifier.ledger.unchecked(name, call.results)
@@ -431,11 +433,11 @@ class CompiledFrame:
             arguments[_N], arguments[_OUT] = len(part), address(part)
             # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
             # Therefore the buffer `stage` has extra space.
-            stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
+            stage = aligned_empty(LANES * part[0].size + LANES) if row.columns and uses_buffer(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):
                 arguments[index] = address(x)
             return int(task(arguments))
 
-        if in_blocks(compute, inputs, out, threads):
+        if compute_in_blocks(compute, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

@@ -9,7 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from urdfkin.export.c import comment, fill_template, main, parameters, vectors, what
+from urdfkin.export.c import (
+    comment_block,
+    describe_result,
+    fill_template,
+    main_program,
+    parameter_list,
+    test_vector_lines,
+)
 from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.function import Function
 
@@ -19,17 +26,17 @@ def write(code: FrameCode, to: str = "cpp") -> str:
     return _cuda(code) if to == "cuda" else _cpp(code)
 
 
-def _header(file: str, code: FrameCode, head: list[str], before: str, *frames: str, **texts: str) -> str:
+def _header(file: str, code: FrameCode, head: list[str], before: str, *templates: str, **texts: str) -> str:
     name, up = code.name, code.name.upper()
     functions = (line for function in code.functions for line in _function(code, function, before))
     return fill_template(
         file,
-        head=comment([*code.head, "", *head]),
+        head=comment_block([*code.header, "", *head]),
         title=name,
         UP=up,
         start=fill_template("main.hpp", title=name, UP=up).rstrip(),
         functions="\n".join(functions),
-        main="\n".join([*vectors(code), main(code, *frames)]),
+        main="\n".join([*test_vector_lines(code), main_program(code, *templates)]),
         **texts,
     )
 
@@ -85,7 +92,7 @@ def _cuda(code: FrameCode) -> str:
 def _declarations(code: FrameCode, function: Function) -> list[str]:
     name = f"{code.name}_{function.name}"
     return [
-        f"int {name}_{real}(size_t n, {parameters(function, real)}, struct CUstream_st *stream)"
+        f"int {name}_{real}(size_t n, {parameter_list(function, real)}, struct CUstream_st *stream)"
         for real in ("double", "float")
     ]
 
@@ -100,7 +107,7 @@ def _kernel(code: FrameCode, function: Function) -> str:
     return fill_template(
         "kernel.cuh",
         name=function.name,
-        parameters=parameters(function, "T"),
+        parameters=parameter_list(function, "T"),
         count=len(function.results),
         own=", ".join(f"own_{x}[{max(1, width)}]" for x, width in widths.items()),
         reads="\n".join(
@@ -114,12 +121,12 @@ def _kernel(code: FrameCode, function: Function) -> str:
 
 def _function(code: FrameCode, function: Function, before: str) -> Iterator[str]:
     writer = Writer(code, function, lambda x: f"T({x!r})")
-    yield f"\n/* {what(function)}, row by row; {function.operations} operations. */"
-    yield f"template <class T> {before}void {function.name}({parameters(function, 'T')})\n{{"
+    yield f"\n/* {describe_result(function)}, row by row; {function.operation_count} operations. */"
+    yield f"template <class T> {before}void {function.name}({parameter_list(function, 'T')})\n{{"
     yield "    using std::cos;\n    using std::sin;\n    using std::sqrt;"
     yield from (f"    (void){letter};" for letter in function.inputs)
     for node in writer.inputs:
-        yield f"    const T {writer.names[node]} = {node.op}[{node.of[0]}];"
+        yield f"    const T {writer.names[node]} = {node.op}[{node.operands[0]}];"
     for head, lines in writer.statements():
         yield f"    /* {head} */"
         yield from (f"    const T {name} = {value};" for name, value in lines)

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry
-from urdfkin.dh.units import fraction_text, pi_fraction
+from urdfkin.dh.units import format_pi_fraction, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
-from urdfkin.export.function import INPUTS, Function, function_of
-from urdfkin.export.proof import Proof, compare
+from urdfkin.export.function import INPUT_LETTERS, Function, make_function
+from urdfkin.export.proof import Proof, compare_with_pinocchio
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -29,9 +29,9 @@ from urdfkin.verify.verifier import Verifier
 
 #: Largest angle (rad) that may become a multiple of pi/12.
 #: Up to this angle, the distance between neighbouring doubles is far smaller than pi/12.
-_LARGEST = 100.0
+_MAX_ANGLE = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
-_RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
+_RIGHT_ANGLES = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True)
@@ -49,23 +49,23 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """Expressions with exact constants; `recognised` maps each replaced angle to its multiple of pi."""
+    """Expressions with exact constants; `pi_multiples` maps each replaced angle to its multiple of pi."""
 
     zero = 0
 
     def __init__(self) -> None:
         super().__init__()
-        self.recognised: dict[Fraction, PiMultiple] = {}
+        self.pi_multiples: dict[Fraction, PiMultiple] = {}
 
-    def made(self, op: str, *of: Any) -> Node:
-        if any(isinstance(x, float) for x in of):
+    def make_node(self, op: str, *operands: Any) -> Node:
+        if any(isinstance(x, float) for x in operands):
             raise TypeError(f"an operand of {op} is a double")
-        return super().made(op, *of)
+        return super().make_node(op, *operands)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
         """Return a constant angle, as `PiMultiple` if it is a multiple of pi/12."""
-        factor = pi_fraction(float(x)) if 0 < abs(x) < _LARGEST else None
-        return x if factor is None else self.recognised.setdefault(x, PiMultiple(factor))
+        factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
+        return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
         if not isinstance(x, Node | PiMultiple):
@@ -73,8 +73,8 @@ class ExactGraph(Graph):
         if x == 0:
             return 0, 1
         if isinstance(x, PiMultiple) and (2 * x.factor).denominator == 1:
-            return _RIGHT[int(2 * x.factor) % 4]
-        return self.made("sin", x), self.made("cos", x)
+            return _RIGHT_ANGLES[int(2 * x.factor) % 4]
+        return self.make_node("sin", x), self.make_node("cos", x)
 
     def root(self, x: Number) -> Number:
         if not isinstance(x, Node):
@@ -82,13 +82,13 @@ class ExactGraph(Graph):
             root = Fraction(math.isqrt(x.numerator), math.isqrt(x.denominator))
             if root * root == x:
                 return root
-        return self.made("sqrt", x)
+        return self.make_node("sqrt", x)
 
 
-def exact_plan(
+def make_exact_plan(
     graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
 ) -> CompiledTree:
-    graph.place = -1
+    graph.step = -1
     eq, path = graph.chapter, tree.path(link)
     joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
     R, p, rows = IDENTITY, ZERO, list[tuple[Number, ...]]()
@@ -122,10 +122,10 @@ def _aligning(axis: Vector, z: float) -> Matrix:
     return rows
 
 
-def ball(x: Number) -> Number:
+def to_interval(x: Number) -> Number:
     """Return an exact constant as an interval (midpoint and radius)."""
     if isinstance(x, PiMultiple):
-        return exact(0).pi() * ball(x.factor)
+        return exact(0).pi() * to_interval(x.factor)
     return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
 
 
@@ -141,18 +141,18 @@ _OPERATIONS: dict[str, Callable[..., Number]] = {
 }
 
 
-def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
+def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
     """Return the results for one configuration as intervals."""
     values: dict[Any, Number] = {}
 
     def value(x: Number) -> Number:
-        return values[x] if isinstance(x, Node) else ball(x)
+        return values[x] if isinstance(x, Node) else to_interval(x)
 
     for node in function.nodes:
-        if node.op in INPUTS:
-            values[node] = exact(inputs[INPUTS.index(node.op)][node.of[0]])
+        if node.op in INPUT_LETTERS:
+            values[node] = exact(inputs[INPUT_LETTERS.index(node.op)][node.operands[0]])
         else:
-            values[node] = _OPERATIONS[node.op](*map(value, node.of))
+            values[node] = _OPERATIONS[node.op](*map(value, node.operands))
     return list(map(value, function.results))
 
 
@@ -160,26 +160,25 @@ def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]
 class ExactProof(Proof):
     """The checks of an exported file with exact constants.
 
-    The code contains multiples of pi instead of `angles` different angles. `most` is the largest difference
-    (rad) between an angle and the multiple of pi that replaces it.
+    The code contains multiples of pi instead of `angle_count` different angles. `max_angle_change` is the
+    largest difference (rad) between an angle and the multiple of pi that replaces it.
     """
 
-    angles: int = 0
-    most: float = 0.0
+    angle_count: int = 0
+    max_angle_change: float = 0.0
 
     @property
-    def evaluated(self) -> str:
+    def precision_text(self) -> str:
         return f"at {DIGITS} digits"
 
     @property
     def constants(self) -> str:
-        change = f", changed by at most {self.most:.1e} rad" if self.angles else ""
-        return (
-            f"Constants are the URDF's decimals; {self.angles} different angles are multiples of pi{change}"
-        )
+        change = f", changed by at most {self.max_angle_change:.1e} rad" if self.angle_count else ""
+        angles = f"{self.angle_count} different angles are multiples of pi"
+        return f"Constants are the URDF's decimals; {angles}{change}"
 
 
-def exact_functions(
+def make_exact_functions(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
@@ -193,30 +192,39 @@ def exact_functions(
     with precision(DIGITS):
         for other in functions:
             graph = ExactGraph()
-            plan = exact_plan(graph, verifier.text, tree, other.plan, tree.frame_link(frame))
-            found.append(function_of(plan, other.quantity, reference, graph))
-            angles |= graph.recognised
-        most = max((float(abs(ball(x) - ball(y)).upper()) for x, y in angles.items()), default=0.0)
-    certificate = compare(verifier, plan_of, frame, reference, found, _evaluated, verify)
+            plan = make_exact_plan(graph, verifier.text, tree, other.plan, tree.frame_link(frame))
+            found.append(make_function(plan, other.quantity, reference, graph))
+            angles |= graph.pi_multiples
+        max_angle_change = max(
+            (float(abs(to_interval(x) - to_interval(y)).upper()) for x, y in angles.items()), default=0.0
+        )
+    certificate = compare_with_pinocchio(
+        verifier, plan_of, frame, reference, found, _evaluate_exactly, verify
+    )
     fields = {name: getattr(proof, name) for name in ("sha256", "urdfkin", "vectors", "lock")}
     return tuple(found), ExactProof(
-        **fields, certificate=certificate, single={}, angles=len(angles), most=most
+        **fields,
+        certificate=certificate,
+        single_precision_bounds={},
+        angle_count=len(angles),
+        max_angle_change=max_angle_change,
     )
 
 
-def _evaluated(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
+def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Return the results (n, ...), computed at fifty digits and rounded."""
     with precision(DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
-            list(map(float, balls(function, one))) for one in zip(*(x.tolist() for x in inputs), strict=True)
+            list(map(float, evaluate_intervals(function, one)))
+            for one in zip(*(x.tolist() for x in inputs), strict=True)
         ]
     return np.array(rows).reshape(-1, *function.shape)
 
 
-def literal(x: Number) -> str:
+def format_literal(x: Number) -> str:
     """Return a constant as code for SymPy: `2`, `Rational(17, 40)`, `pi/2`."""
     if isinstance(x, PiMultiple):
-        text = fraction_text(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
+        text = format_pi_fraction(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
         return text if x.factor > 0 else f"(-{text})"
     x = Fraction(x)
     return str(x) if x.denominator == 1 else f"Rational({x.numerator}, {x.denominator})"

@@ -7,7 +7,7 @@ becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressio
 sine and the cosine of each joint occur once.
 
 >>> graph = Graph()
->>> x, y = graph.input("q", 0), graph.input("q", 1)
+>>> x, y = graph.make_input("q", 0), graph.make_input("q", 1)
 >>> 0.0 * x + y * 1.0 is y, x * y is y * x, x - x
 (True, True, 0.0)
 """
@@ -32,16 +32,16 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants; for an input such as q[3], the index 3.
+        operands: The operands, which are nodes and constants; for an input such as q[3], the index 3.
         index: Number of the expression in the order of creation; operands have smaller numbers.
-        place: Index of the joint on the path at which the recursion created this expression.
+        step: Index of the joint on the path at which the recursion created this expression.
     """
 
-    __slots__ = ("equation", "graph", "index", "name", "of", "op", "place")
+    __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
 
-    def __init__(self, graph: Graph, op: str, of: tuple[Any, ...], index: int) -> None:
-        self.graph, self.op, self.of, self.index = graph, op, of, index
-        self.place, self.equation, self.name = graph.place, graph.equation, ""
+    def __init__(self, graph: Graph, op: str, operands: tuple[Any, ...], index: int) -> None:
+        self.graph, self.op, self.operands, self.index = graph, op, operands, index
+        self.step, self.equation, self.name = graph.step, graph.equation, ""
 
     def __add__(self, other: Number) -> Number:
         return self.graph.sum(self, other)
@@ -62,17 +62,17 @@ class Node:
         return self.graph.product(other, self)
 
     def __truediv__(self, other: Number) -> Number:
-        return self.graph.made("/", self, other)
+        return self.graph.make_node("/", self, other)
 
     def __rtruediv__(self, other: Number) -> Number:
-        return other if _is(other, 0.0) else self.graph.made("/", other, self)
+        return other if _equals(other, 0.0) else self.graph.make_node("/", other, self)
 
     def __neg__(self) -> Number:
-        return self.of[0] if self.op == "neg" else self.graph.made("neg", self)
+        return self.operands[0] if self.op == "neg" else self.graph.make_node("neg", self)
 
     @property
-    def operands(self) -> list[Node]:
-        return [x for x in self.of if isinstance(x, Node)]
+    def operand_nodes(self) -> list[Node]:
+        return [x for x in self.operands if isinstance(x, Node)]
 
 
 class Graph:
@@ -82,59 +82,59 @@ class Graph:
     zero: float = 0.0
 
     def __init__(self) -> None:
-        self._made: dict[tuple[Any, ...], Node] = {}
-        self.place, self.equation = 0, ""
+        self._nodes: dict[tuple[Any, ...], Node] = {}
+        self.step, self.equation = 0, ""
         self.chapter: Any = bind_equations(decorate=self._record_numbers)
 
-    def input(self, letter: str, place: int) -> Node:
-        return self.made(letter, place)
+    def make_input(self, letter: str, index: int) -> Node:
+        return self.make_node(letter, index)
 
-    def made(self, op: str, *of: Any) -> Node:
+    def make_node(self, op: str, *operands: Any) -> Node:
         """Return the node of an operation; equal operations on the same operands have the same node."""
-        key = (op, *of)
-        if (node := self._made.get(key)) is None:
-            node = self._made[key] = Node(self, op, of, len(self._made))
+        key = (op, *operands)
+        if (node := self._nodes.get(key)) is None:
+            node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
         return node
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
         if not isinstance(x, Node):
             return math.sin(x), math.cos(x)
-        return self.made("sin", x), self.made("cos", x)
+        return self.make_node("sin", x), self.make_node("cos", x)
 
     def root(self, x: Number) -> Number:
-        return self.made("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
+        return self.make_node("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
 
     def sum(self, x: Number, y: Number) -> Number:
-        if _is(x, 0.0) or _is(y, 0.0):
-            return y if _is(x, 0.0) else x
-        if (positive := _without_minus(y)) is not None:
+        if _equals(x, 0.0) or _equals(y, 0.0):
+            return y if _equals(x, 0.0) else x
+        if (positive := _negated_operand(y)) is not None:
             return self.difference(x, positive)
-        if (positive := _without_minus(x)) is not None:
+        if (positive := _negated_operand(x)) is not None:
             return self.difference(y, positive)
-        return self.made("+", *_in_order(x, y))
+        return self.make_node("+", *_sort_operands(x, y))
 
     def difference(self, x: Number, y: Number) -> Number:
-        if x is y or _is(y, 0.0):
+        if x is y or _equals(y, 0.0):
             return self.zero if x is y else x
-        if _is(x, 0.0):
+        if _equals(x, 0.0):
             return -y
-        if (positive := _without_minus(y)) is not None:
+        if (positive := _negated_operand(y)) is not None:
             return self.sum(x, positive)
-        if (positive := _without_minus(x)) is not None:
+        if (positive := _negated_operand(x)) is not None:
             return -self.sum(positive, y)
-        if (other := self._made.get(("-", y, x))) is not None:
+        if (other := self._nodes.get(("-", y, x))) is not None:
             return -other
-        return self.made("-", x, y)
+        return self.make_node("-", x, y)
 
     def product(self, x: Number, y: Number) -> Number:
-        if _is(x, 0.0) or _is(y, 0.0):
+        if _equals(x, 0.0) or _equals(y, 0.0):
             return self.zero
         for one, other in ((x, y), (y, x)):
-            if _is(one, 1.0):
+            if _equals(one, 1.0):
                 return other
-            if (positive := _without_minus(one)) is not None:
+            if (positive := _negated_operand(one)) is not None:
                 return -(positive * other)
-        return self.made("*", *_in_order(x, y))
+        return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Return an equation that stores its number in the nodes that it creates.
@@ -159,28 +159,28 @@ class Graph:
         return recording
 
 
-def _is(x: Number, value: float) -> bool:
+def _equals(x: Number, value: float) -> bool:
     return not isinstance(x, Node) and x == value
 
 
-def _without_minus(x: Number) -> Number:
+def _negated_operand(x: Number) -> Number:
     """Return y if x is -y, where y is an expression or a positive constant; else None."""
     if isinstance(x, Node):
-        return x.of[0] if x.op == "neg" else None
+        return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
 
 
-def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
+def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
     """Return operands in a fixed order, so that x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
-def needed(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
+def find_dependencies(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
     """Return all nodes that the results depend on; operations in `leaves` count as inputs."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:
             seen.add(node)
-            waiting += [] if node.op in leaves else node.operands
+            waiting += [] if node.op in leaves else node.operand_nodes
     return sorted(seen, key=lambda node: node.index)

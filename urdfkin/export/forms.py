@@ -11,20 +11,20 @@ from dataclasses import replace
 from typing import Any
 
 from urdfkin.dh.convert import link_names
-from urdfkin.dh.export.text import document
+from urdfkin.dh.export.text import table_document
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
 from urdfkin.export import FORMS, QUANTITIES
-from urdfkin.export.code import FrameCode, code_of
-from urdfkin.export.naming import all_safe, safe
+from urdfkin.export.code import FrameCode, make_verified_code
+from urdfkin.export.naming import safe_name, unique_safe_names
 from urdfkin.model.reference import Reference
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 from urdfkin.urdf.findings import UrdfWarning
 
 
-def code_of_robot(
+def make_robot_code(
     robot: Any,
     frame: str,
     quantities: Collection[str],
@@ -38,13 +38,15 @@ def code_of_robot(
         raise UnknownNameError("form", form, FORMS)
     verify = bool(robot.verifier.policy_of_call(verify))
     if form == "tree":
-        return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
+        return make_verified_code(
+            robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify
+        )
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)
-    code = code_of_chain(chain, quantities, reference, name=name, verify=verify)
+    code = make_chain_code(chain, quantities, reference, name=name, verify=verify)
     return replace(code, maybe_proof=replace(code.proof, lock=robot.origin.lock))
 
 
-def code_of_chain(
+def make_chain_code(
     chain: DHTable | ProductOfExponentials,
     quantities: Collection[str] | None = None,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
@@ -54,17 +56,17 @@ def code_of_chain(
 ) -> FrameCode:
     """Return the code for the last frame of a chain. The chain's base is the world frame."""
     if isinstance(chain, DHTable):
-        text, chain = document(chain, Units()).text(), _with_safe_names(chain)
+        text, chain = table_document(chain, Units()).text(), _replace_unsafe_names(chain)
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UrdfWarning)  # The user did not write this URDF.
-        robot = hook("a robot of a source")(chain, verify=verify)
+        robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
     if quantities is None:
         quantities = QUANTITIES if robot.nv else QUANTITIES[:1]
-    return code_of(
+    return make_verified_code(
         robot.verifier,
         robot.plan,
         frame,
@@ -76,12 +78,12 @@ def code_of_chain(
     )
 
 
-def _with_safe_names(table: DHTable) -> DHTable:
+def _replace_unsafe_names(table: DHTable) -> DHTable:
     """Replace each name of a joint or frame that is not allowed in a URDF."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )
-    new = dict(zip(names, all_safe(names), strict=True))
+    new = dict(zip(names, unique_safe_names(names), strict=True))
     rows = tuple(
         replace(
             row, joint=new[row.joint], mimic=row.mimic and replace(row.mimic, leader=new[row.mimic.leader])
@@ -89,4 +91,4 @@ def _with_safe_names(table: DHTable) -> DHTable:
         for row in table.rows
     )
     base, tip = new[table.base_frame], new[table.tip_frame]
-    return replace(table, robot=safe(table.robot), base_frame=base, tip_frame=tip, rows=rows)
+    return replace(table, robot=safe_name(table.robot), base_frame=base, tip_frame=tip, rows=rows)

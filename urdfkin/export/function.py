@@ -24,7 +24,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export import recursion
-from urdfkin.export.expression import Graph, Node, Number, needed
+from urdfkin.export.expression import Graph, Node, Number, find_dependencies
 from urdfkin.kinematics.roundings import (
     SINGLE_EPS,
     SINGLE_LARGEST,
@@ -37,13 +37,13 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
-INPUTS = ("q", "v", "a")
+INPUT_LETTERS = ("q", "v", "a")
 #: Operations whose result is always assigned to a variable.
-_ALWAYS = ("sin", "cos", "sqrt", "/")
+_ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement.
-_LONGEST = 12
+_MAX_OPERATIONS = 12
 #: Maximum number of results in one backward pass, to limit the memory.
-_MOST_RESULTS = 512
+_MAX_RESULTS = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +71,15 @@ class Function:
     @cached_property
     def nodes(self) -> list[Node]:
         """All expressions that the results need; an expression comes after its operands."""
-        return needed(self.results)
+        return find_dependencies(self.results)
 
     @cached_property
-    def operations(self) -> int:
-        return sum(node.op not in (*INPUTS, "neg") for node in self.nodes)
+    def operation_count(self) -> int:
+        return sum(node.op not in (*INPUT_LETTERS, "neg") for node in self.nodes)
 
     @cached_property
     def angles(self) -> list[Node]:
-        found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
+        found = (node.operands[0] for node in self.nodes if node.op in ("sin", "cos"))
         return list(dict.fromkeys(found))
 
     @cached_property
@@ -87,37 +87,44 @@ class Function:
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
-                uses[_without_minus(value)] += 1
+                uses[_strip_minus(value)] += 1
         for node in self.nodes:
             if node.op != "neg":
-                uses.update(map(_without_minus, node.operands))
+                uses.update(map(_strip_minus, node.operand_nodes))
         found, length = list[Node](), dict[Node, int]()
         for node in self.nodes:
-            length[node] = 1 + sum(length[x] for x in node.operands)
-            if node.op in INPUTS or node.op == "neg":
-                length[node] = 0 if node.op in INPUTS else length[node.of[0]]
-            elif node.name or uses[node] > 1 or node.op in _ALWAYS or length[node] > _LONGEST:
+            length[node] = 1 + sum(length[x] for x in node.operand_nodes)
+            if node.op in INPUT_LETTERS or node.op == "neg":
+                length[node] = 0 if node.op in INPUT_LETTERS else length[node.operands[0]]
+            elif (
+                node.name
+                or uses[node] > 1
+                or node.op in _ASSIGNED_OPERATIONS
+                or length[node] > _MAX_OPERATIONS
+            ):
                 found.append(node)
                 length[node] = 0
         return found
 
-    def needed_without(self, leaves: Collection[str]) -> set[Node]:
-        return set(needed(self.results, leaves))
+    def dependencies_without(self, leaves: Collection[str]) -> set[Node]:
+        return set(find_dependencies(self.results, leaves))
 
-    def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
+    def node_values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
         """Return the value (n,) of each expression for q (n, nq), v and a (n, nv)."""
         value: dict[Node, Any] = {}
-        arrays = dict(zip(INPUTS, inputs, strict=False))
+        arrays = dict(zip(INPUT_LETTERS, inputs, strict=False))
         for node in self.nodes:
             if node.op in arrays:
-                value[node] = arrays[node.op][:, node.of[0]]
+                value[node] = arrays[node.op][:, node.operands[0]]
             else:
-                value[node] = _OPERATIONS[node.op](*(value[x] if isinstance(x, Node) else x for x in node.of))
+                value[node] = _OPERATIONS[node.op](
+                    *(value[x] if isinstance(x, Node) else x for x in node.operands)
+                )
         return value
 
-    def evaluated(self, inputs: Sequence[FloatArray]) -> FloatArray:
+    def evaluate(self, inputs: Sequence[FloatArray]) -> FloatArray:
         """Return the results (n, ...) for q (n, nq), v and a (n, nv), computed with NumPy."""
-        value = self.values(inputs)
+        value = self.node_values(inputs)
         out = np.empty((len(inputs[0]), len(self.results)))
         for k, x in enumerate(self.results):
             out[:, k] = value[x] if isinstance(x, Node) else x
@@ -147,12 +154,12 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 }
 
 
-def _without_minus(node: Node) -> Node:
+def _strip_minus(node: Node) -> Node:
     """Return x if the expression is -x; exported code stores x in a variable, and negates x at each use."""
-    return node.of[0] if node.op == "neg" else node
+    return node.operands[0] if node.op == "neg" else node
 
 
-def function_of(
+def make_function(
     plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
 ) -> Function:
     """Return the function that computes a quantity for the only frame of `plan`.
@@ -161,15 +168,15 @@ def function_of(
     """
     graph = graph or Graph()
 
-    def begin_step(place: int) -> None:
-        graph.place = place
+    def begin_step(step: int) -> None:
+        graph.step = step
 
-    kind = recursion.NumberKind(graph.chapter, graph.sine_cosine, graph.root, begin_step, _name)
+    kind = recursion.NumberKind(graph.chapter, graph.sine_cosine, graph.root, begin_step, _name_nodes)
     inputs = [
-        [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
+        [graph.make_input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
         if letter in quantity.inputs
         else [0.0] * plan.nv
-        for letter in INPUTS
+        for letter in INPUT_LETTERS
     ]
     results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
     # The sum with 0.0 turns -0.0 into 0.0.
@@ -178,12 +185,12 @@ def function_of(
     )
 
 
-def _name(place: int, state: LinkState) -> None:
+def _name_nodes(step: int, state: LinkState) -> None:
     """Name the numbers of a link's state after the textbook's symbols, for example `w2_z`."""
-    named = {f"R{place + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
+    named = {f"R{step + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)
-        named |= {f"{letter}{place + 1}_{axis}": x for axis, x in zip("xyz", vector, strict=True)}
+        named |= {f"{letter}{step + 1}_{axis}": x for axis, x in zip("xyz", vector, strict=True)}
     for name, x in named.items():
         if isinstance(x, Node) and x.op in ("+", "-", "*") and not x.name:
             x.name = name
@@ -200,10 +207,10 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
     errors of the code's constants in double precision. A bound is inf if the code computes a number beyond
     the range of single precision.
     """
-    value = function.values(inputs)
+    value = function.node_values(inputs)
     bounds = np.zeros((len(inputs[0]), len(function.results)))
-    for first in range(0, bounds.shape[1], _MOST_RESULTS):
-        part = slice(first, first + _MOST_RESULTS)
+    for first in range(0, bounds.shape[1], _MAX_RESULTS):
+        part = slice(first, first + _MAX_RESULTS)
         bounds[:, part] = _bounds_of_results(function, value, function.results[part], len(bounds))
     return bounds
 
@@ -232,9 +239,9 @@ def _bounds_of_results(
         if (slope := slopes.pop(node, None)) is None:
             continue
         bound += np.abs(slope) * _operation_error(node, value[node])[:, np.newaxis]
-        if node.op not in INPUTS:
-            of = [value[x] if isinstance(x, Node) else x for x in node.of]
-            for x, factor in zip(node.of, _SLOPES[node.op](value[node], *of), strict=True):
+        if node.op not in INPUT_LETTERS:
+            operands = [value[x] if isinstance(x, Node) else x for x in node.operands]
+            for x, factor in zip(node.operands, _SLOPES[node.op](value[node], *operands), strict=True):
                 propagate(x, slope * np.reshape(factor, (-1, 1)), slice(None))
     return np.where(np.isnan(bound), np.inf, bound)
 
@@ -242,7 +249,7 @@ def _bounds_of_results(
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
     """Return the rounding error (n,) of an operation with results x (n,), in eps."""
     size = np.abs(x)
-    if node.op in INPUTS:
+    if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
     elif node.op in ("sin", "cos"):
         error = np.maximum(SINGLE_OPERATION[node.op] * size, SINGLE_POLYNOMIAL)

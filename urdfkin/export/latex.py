@@ -42,7 +42,7 @@ def write(code: FrameCode, to: str = "latex") -> str:
         enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
     )
     lines = [
-        *(f"% {line}".rstrip() for line in code.head),
+        *(f"% {line}".rstrip() for line in code.header),
         r"\documentclass{article}",
         r"\usepackage{amsmath}",
         r"\allowdisplaybreaks",
@@ -65,17 +65,17 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
     writer.names = {node: _symbol(node, name) for node, name in writer.names.items()}
     yield rf"\subsection*{{{function.quantity.title}, eq. {', '.join(function.quantity.equations)}}}"
     for head, lines in writer.statements():
-        place, _, equations = head.partition(": ")
-        yield rf"{latex_text(place)}{f' ({equations})' if equations else ''}:"
-        yield from _aligned(lines)
+        step, _, equations = head.partition(": ")
+        yield rf"{latex_text(step)}{f' ({equations})' if equations else ''}:"
+        yield from _align_lines(lines)
     letter = _RESULTS[function.name]
-    yield from _aligned(
+    yield from _align_lines(
         (f"{letter}_{{{','.join(str(i + 1) for i in indices)}}}", value)
         for indices, value in zip(np.ndindex(function.shape), writer.results(), strict=True)
     )
 
 
-def _aligned(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
+def _align_lines(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
     yield r"\begin{align*}"
     yield " \\\\\n".join(f"{symbol} &= {_formula(value)}" for symbol, value in lines)
     yield r"\end{align*}"
@@ -83,9 +83,9 @@ def _aligned(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
 
 def _symbol(node: Node, name: str) -> str:
     if node.op in ("q", "v", "a"):
-        return f"{node.op}_{{{node.of[0] + 1}}}"
+        return f"{node.op}_{{{node.operands[0] + 1}}}"
     if node.op in ("sin", "cos"):
-        return f"{node.op[0]}_{{{node.place + 1}}}"
+        return f"{node.op[0]}_{{{node.step + 1}}}"
     if found := _NAME.fullmatch(name):
         return f"{_LETTERS[found[1]]}^{{({found[2]})}}_{{{found[3]}}}"
     return f"t_{{{name[1:]}}}"

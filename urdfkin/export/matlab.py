@@ -33,7 +33,7 @@ end
 def write(code: FrameCode, to: str = "matlab") -> str:
     name = f"{code.name}_kinematics"
     head = [
-        *code.head,
+        *code.header,
         "",
         f"f = {name}();  J = f.jacobian(q);  f.check() runs the test vectors. Indices begin at 1.",
     ]
@@ -50,11 +50,11 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
     shape = function.shape if len(function.shape) > 1 else (*function.shape, 1)
     yield f"function out = {function.name}({', '.join(function.inputs)})"
     numbers = ", ".join(function.quantity.equations)
-    yield f"% {' x '.join(map(str, shape))}, eq. {numbers}; {function.operations} operations."
+    yield f"% {' x '.join(map(str, shape))}, eq. {numbers}; {function.operation_count} operations."
     for x, width in code.widths(function).items():
         yield f"if numel({x}) ~= {width}, error('{x} needs {width} numbers: found %d', numel({x})), end"
     for node in writer.inputs:
-        yield f"{writer.names[node]} = {node.op}({node.of[0] + 1});"
+        yield f"{writer.names[node]} = {node.op}({node.operands[0] + 1});"
     for head, lines in writer.statements():
         yield f"% {head}"
         yield from (f"{name} = {value};" for name, value in lines)
@@ -76,7 +76,7 @@ def _check(code: FrameCode) -> str:
         arguments = ", ".join(f"{letter}(k, :)" for letter in function.inputs)
         checks += [
             f"right = {_matrix([vector.results[name] for vector in vectors])}",
-            f"within = {_matrix([vector.within[name] for vector in vectors])}",
+            f"within = {_matrix([vector.tolerances[name] for vector in vectors])}",
             "found = zeros(size(right));",
             f"for k = 1:{len(vectors)}",
             f"    x = {name}({arguments});",

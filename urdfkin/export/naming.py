@@ -9,32 +9,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from urdfkin.dh.export.code import plain
+from urdfkin.dh.export.code import sanitize
 
 #: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix.
-_LONGEST = 40
-_LONGEST_IN_COMMENT = 80
+_MAX_LENGTH = 40
+_MAX_COMMENT_LENGTH = 80
 
 
-def safe(name: str) -> str:
+def safe_name(name: str) -> str:
     """Return a name with only letters, digits and single underscores.
 
-    >>> safe("panda_joint1"), safe("*/ int x; //"), safe("%")
+    >>> safe_name("panda_joint1"), safe_name("*/ int x; //"), safe_name("%")
     ('panda_joint1', 'int_x', 'x')
     """
-    word = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:_LONGEST].strip("_")
+    word = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:_MAX_LENGTH].strip("_")
     return word or "x"
 
 
-def all_safe(names: Iterable[str]) -> list[str]:
+def unique_safe_names(names: Iterable[str]) -> list[str]:
     """Return a different identifier for each name, even for a language that ignores case.
 
-    >>> all_safe(["a b", "a/b", "A_b_2"])
+    >>> unique_safe_names(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
     """
     found: dict[str, str] = {}
     for name in names:
-        word, k = safe(name), 1
+        word, k = safe_name(name), 1
         identifier = word
         while identifier.lower() in found:
             k += 1
@@ -43,19 +43,21 @@ def all_safe(names: Iterable[str]) -> list[str]:
     return list(found.values())
 
 
-def title(robot: str, frame: str) -> str:
+def function_prefix(robot: str, frame: str) -> str:
     """Return the prefix of the exported functions of a frame; it begins with a letter.
 
-    >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
-    ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')
+    >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
+    ('panda_hand', 'ur5_tool0')
+    >>> function_prefix("2", "x"), function_prefix("", "my arm")
+    ('robot_2_x', 'my_arm')
     """
-    first, second = safe(robot) if robot else "", safe(frame)
+    first, second = safe_name(robot) if robot else "", safe_name(frame)
     word = second if second.startswith(first) else f"{first}_{second}"
     return word if word[0].isalpha() else f"robot_{word}"
 
 
 def comment_name(name: str) -> str:
-    return comment_text(name if len(name) <= _LONGEST_IN_COMMENT else f"{name[:_LONGEST_IN_COMMENT]}...")
+    return comment_text(name if len(name) <= _MAX_COMMENT_LENGTH else f"{name[:_MAX_COMMENT_LENGTH]}...")
 
 
 def comment_text(text: str) -> str:
@@ -66,4 +68,4 @@ def comment_text(text: str) -> str:
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'
     """
-    return plain(text).replace("?", "_")
+    return sanitize(text).replace("?", "_")

@@ -24,7 +24,7 @@ from urdfkin.model.configuration import draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.lazy_import import own_version
+from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
@@ -34,44 +34,44 @@ from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared with Pinocchio.
 #: The neutral configuration and the joint limits are compared too.
-CHECKED = 100
-VECTORS = 4
+PROOF_SAMPLES = 100
+VECTOR_COUNT = 4
 
 
 @dataclass(frozen=True)
-class Vector:
+class ExportVector:
     """A test vector: one configuration, and the true result of each function.
 
-    `within` and `single` are the error bounds in double precision (in eps = 2^-52) and in single precision
-    (in eps = 2^-23). If the code computes a number beyond the range of single precision, no error bound
-    exists, and `single` contains 0.0.
+    `tolerances` and `single_tolerances` are the error bounds in double precision (in eps = 2^-52) and in
+    single precision (in eps = 2^-23). If the code computes a number beyond the range of single precision, no
+    error bound exists, and `single_tolerances` contains 0.0.
     """
 
     inputs: tuple[list[float], ...]
     results: dict[str, list[str]]
-    within: dict[str, list[str]]
-    single: dict[str, list[str]]
+    tolerances: dict[str, list[str]]
+    single_tolerances: dict[str, list[str]]
 
 
 @dataclass(frozen=True)
 class Proof:
     """The checks of an exported file: test vectors and the comparison with Pinocchio.
 
-    `single` contains the largest error bound of each quantity in single precision, in multiples of
-    eps * scale. The scale of a number is an upper bound on the sum of the absolute values of its terms. If a
-    number is beyond the range of single precision, the error bound is inf. `lock` contains the value of each
-    locked joint.
+    `single_precision_bounds` contains the largest error bound of each quantity in single precision, in
+    multiples of eps * scale. The scale of a number is an upper bound on the sum of the absolute values of its
+    terms. If a number is beyond the range of single precision, the error bound is inf. `lock` contains the
+    value of each locked joint.
     """
 
     sha256: str
     urdfkin: str
     certificate: Certificate
-    vectors: tuple[Vector, ...]
-    single: dict[str, float]
+    vectors: tuple[ExportVector, ...]
+    single_precision_bounds: dict[str, float]
     lock: tuple[tuple[str, float], ...] = ()
 
     @property
-    def evaluated(self) -> str:
+    def precision_text(self) -> str:
         return "in double precision"
 
     @property
@@ -85,7 +85,7 @@ class Proof:
             reasons = comment_text("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
         else:
-            verdict = [f"Verified by {oracle}, the expressions below evaluated {self.evaluated}:"] + [
+            verdict = [f"Verified by {oracle}, the expressions below evaluated {self.precision_text}:"] + [
                 f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
                 f" eps*scale, {line.share:.2%} of the bound"
                 for line in self.certificate.lines
@@ -101,8 +101,10 @@ class Proof:
 
     @property
     def _single_lines(self) -> list[str]:
-        beyond = [name for name, k in self.single.items() if not np.isfinite(k)]
-        bounds = ", ".join(f"{name} {k:.3g}" for name, k in self.single.items() if name not in beyond)
+        beyond = [name for name, k in self.single_precision_bounds.items() if not np.isfinite(k)]
+        bounds = ", ".join(
+            f"{name} {k:.3g}" for name, k in self.single_precision_bounds.items() if name not in beyond
+        )
         lines = [
             "Error bounds in single precision, with the rounding of constants, in eps*scale (eps = 2^-23):",
             f"  {bounds}",
@@ -113,7 +115,7 @@ class Proof:
         ]
 
 
-def prove(
+def make_proof(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
@@ -121,19 +123,21 @@ def prove(
     functions: Sequence[Function],
     verify: bool | None,
 ) -> Proof:
-    certificate = compare(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
-    vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
+    certificate = compare_with_pinocchio(
+        verifier, plan_of, frame, reference, functions, Function.evaluate, verify
+    )
+    vectors, bounds = _make_vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
-        urdfkin=own_version(),
+        urdfkin=urdfkin_version(),
         certificate=certificate,
         vectors=vectors,
-        single=single,
+        single_precision_bounds=bounds,
         lock=verifier.origin.lock,
     )
 
 
-def compare(
+def compare_with_pinocchio(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
@@ -147,53 +151,59 @@ def compare(
     Raise VerificationError if a difference exceeds the error bound.
     """
     checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
-    drawn = draw_samples(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+    samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:
-        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
+        inputs = (samples.q, samples.v, samples.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
         found = evaluate(function, (call.q, *call.rates))
         checker.check(function.quantity, call, found, bool(checker.policy_of_call(verify)))
     return checker.certificate()
 
 
-def _vectors(
+def _make_vectors(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
     reference: Reference,
     functions: Sequence[Function],
-) -> tuple[tuple[Vector, ...], dict[str, float]]:
+) -> tuple[tuple[ExportVector, ...], dict[str, float]]:
     """Return the test vectors, and the largest bound of each quantity in single precision."""
     tree = verifier.tree
     link = tree.frame_link(frame)
-    drawn = draw_samples(tree, VECTORS, np.random.default_rng(1), with_special=False)
-    inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (drawn.q, drawn.v, drawn.a))
-    part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTORS))
-    within, single, largest = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
-    path, found = tree.path(link), []
+    samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_special=False)
+    inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (samples.q, samples.v, samples.a))
+    part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTOR_COUNT))
+    tolerances, single_tolerances, largest_bounds = (
+        dict[str, FloatArray](),
+        dict[str, FloatArray](),
+        dict[str, float](),
+    )
+    path, vectors = tree.path(link), []
     errors = conversion(verifier.text, tree, path, part.q)
     for f in functions:
-        within[f.name], scale = _within(f, part, errors)
-        single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
-        shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
-        largest[f.name] = float(shares.max(initial=0.0))
+        tolerances[f.name], scale = _find_tolerances(f, part, errors)
+        single_tolerances[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * tolerances[f.name]
+        relative_bounds = np.divide(
+            single_tolerances[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0
+        )
+        largest_bounds[f.name] = float(relative_bounds.max(initial=0.0))
     with precision(DIGITS + enough_digits(len(path))):
         joints = read_exact(verifier.text, tree, path)
-        for k in range(VECTORS):
+        for k in range(VECTOR_COUNT):
             motion = move(tree, joints, *(x[k] for x in inputs))
             true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
-            found.append(
-                Vector(
+            vectors.append(
+                ExportVector(
                     tuple(x[k].tolist() for x in inputs),
-                    {name: [decimal(x) for x in values] for name, values in true.items()},
-                    {name: [_rounded_down(x) for x in values[k]] for name, values in within.items()},
-                    {name: [_rounded_up(x) for x in values[k]] for name, values in single.items()},
+                    {name: [format_decimal(x) for x in values] for name, values in true.items()},
+                    {name: [_round_down(x) for x in values[k]] for name, values in tolerances.items()},
+                    {name: [_round_up(x) for x in values[k]] for name, values in single_tolerances.items()},
                 )
             )
-    return tuple(found), largest
+    return tuple(vectors), largest_bounds
 
 
-def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
+def _find_tolerances(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds of a function's results, in eps, and the scales of these results.
 
     Both arrays have the shape (n, numbers). Each error bound is a factor k times the scale of the result.
@@ -203,11 +213,11 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST_NORMAL), 0.0)
     shape = (n, 1, *function.shape)
-    within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
-    return within, scale
+    tolerances, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
+    return tolerances, scale
 
 
-def decimal(x: Number) -> str:
+def format_decimal(x: Number) -> str:
     """Return fifty digits of an interval, without final zeros; 0.0 if the interval contains 0."""
     ball = exact(x)
     if ball.contains(0):
@@ -217,16 +227,16 @@ def decimal(x: Number) -> str:
     return f"{whole}.{fraction.rstrip('0') or '0'}{e}{exponent}"
 
 
-def _rounded_down(x: float) -> str:
-    return _rounded(x, 6, ROUND_FLOOR)
+def _round_down(x: float) -> str:
+    return _round(x, 6, ROUND_FLOOR)
 
 
-def _rounded_up(x: float) -> str:
+def _round_up(x: float) -> str:
     """Round a bound up, because the error of a constant can be equal to its bound."""
-    return _rounded(x, 7, ROUND_CEILING)
+    return _round(x, 7, ROUND_CEILING)
 
 
-def _rounded(x: float, digits: int, rounding: str) -> str:
+def _round(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
         return "0.0"  # A bound of 0 accepts only equal numbers.
     with localcontext(prec=digits, rounding=rounding):

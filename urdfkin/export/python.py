@@ -42,7 +42,7 @@ class Dialect:
     helpers: str = ""
     index: str = "{}[{}]"
     check_parameter: str = ""
-    single: bool = False
+    has_single_precision: bool = False
     more_code: Callable[[FrameCode], str] = lambda code: ""
     more_checks: str = ""
     exact: bool = False
@@ -52,7 +52,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
     return [values[i : i + width] for i in range(0, len(values), width)] if width else []
 
 
-def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
+def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
     """Make `Dialect.result` for code that assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
@@ -65,7 +65,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
     return result
 
 
-def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
+def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
     """Make `Dialect.result` for code that returns a matrix. A Hessian becomes a matrix (6 nv, nv)."""
 
     def result(writer: Writer) -> Iterator[str]:
@@ -83,12 +83,12 @@ def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer],
     return result
 
 
-def _shapes(writer: Writer) -> list[str]:
+def _numpy_first_lines(writer: Writer) -> list[str]:
     inputs = writer.function.inputs
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [
         *(f"{x} = np.asarray({x})" for x in inputs),
-        *_demands(writer),
+        *_check_lines(writer),
         *(f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs),
         f"shape = np.broadcast_shapes({shapes})",
     ]
@@ -104,13 +104,13 @@ def _zero(writer: Writer, xp: str) -> str:
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
 
 
-def _demands(writer: Writer, first: str = "") -> list[str]:
+def _check_lines(writer: Writer, first: str = "") -> list[str]:
     return [
         f'_demand({first}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
     ]
 
 
-def _lengths(text: str) -> Callable[[Writer], list[str]]:
+def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
     """Make `Dialect.first_lines` for code that checks the input lengths of one configuration."""
 
     def first_lines(writer: Writer) -> list[str]:
@@ -125,10 +125,10 @@ def _lengths(text: str) -> Callable[[Writer], list[str]]:
 def _in_any_namespace(writer: Writer) -> list[str]:
     used = [name for name in _FUNCTIONS if any(node.op == name for node in writer.function.nodes)]
     names = [f"{', '.join(used)} = {', '.join(f'xp.{name}' for name in used)}"] if used else []
-    return ["xp = _namespace(q)", *_demands(writer, "xp, "), *names, _zero(writer, "xp")]
+    return ["xp = _namespace(q)", *_check_lines(writer, "xp, "), *names, _zero(writer, "xp")]
 
 
-def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
+def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
     """Make `Dialect.result` for code that stacks the numbers, because the arrays are immutable."""
 
     def result(writer: Writer) -> Iterator[str]:
@@ -172,14 +172,14 @@ _IS_ARRAY = """    if not {is_array}:
 """
 
 
-def _demand(
+def _make_check(
     wrong: str, given: str = "", numbers: str = "a floating type", array: str = "an array", is_array: str = ""
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
     The arguments `wrong` and `is_array` are Python expressions as text. `wrong` is true for numbers of a
-    wrong type. `is_array` is true for an accepted container. If `is_array` is empty, `_demand` accepts every
-    container. `given` contains further parameters of `_demand`.
+    wrong type. `is_array` is true for an accepted container. If `is_array` is empty, `_demand` accepts
+    every container. `given` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -235,12 +235,12 @@ def _torch_module(code: FrameCode) -> str:
         first=first.name,
         inputs=", ".join(first.inputs),
         functions="\n".join(f"    {f.name} = staticmethod({f.name})" for f in code.functions),
-        all=_all(code),
-        rate=_rate(code.functions[0].plan),
+        all=_function_list(code),
+        rate=_rotation_bound(code.functions[0].plan),
     ).lstrip("\n")
 
 
-def _rate(plan: CompiledTree) -> float:
+def _rotation_bound(plan: CompiledTree) -> float:
     """Return an upper bound on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
     Several revolute joints can depend on the same coordinate. For each coordinate, the absolute values of
@@ -256,7 +256,7 @@ def _rate(plan: CompiledTree) -> float:
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
 
 
-def _all(code: FrameCode) -> str:
+def _function_list(code: FrameCode) -> str:
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
@@ -267,18 +267,18 @@ def _demand(name, x, width):
     if found not in ((width,), (width, 1), (1, width)):
         raise ValueError(f"{name} needs {width} numbers: found the shape {found}")
 '''
-_FOUND = 'f"{x} needs {width} numbers: found {{len({x})}}"'
+_LENGTH_MESSAGE = 'f"{x} needs {width} numbers: found {{len({x})}}"'
 _FUNCTIONS = ("cos", "sin", "sqrt")
-_ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
+_EVALUATE_EACH = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
-        helpers=_demand('x.dtype.kind not in "biuf"', numbers="real numbers"),
-        first_lines=_shapes,
+        helpers=_make_check('x.dtype.kind not in "biuf"', numbers="real numbers"),
+        first_lines=_numpy_first_lines,
         index="{}[..., {}]",
-        result=_in_array("np.empty((*shape, {1}))", "..., "),
+        result=_make_array_result("np.empty((*shape, {1}))", "..., "),
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
     "array": Dialect(
@@ -288,12 +288,12 @@ DIALECTS = {
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
-        + _demand('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
+        + _make_check('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
         + "\n"
         + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
         first_lines=_in_any_namespace,
         index="{}[..., {}]",
-        result=_stacked("xp, "),
+        result=_make_stacked_result("xp, "),
         values="arrays = [xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs]\n"
         "    if arrays[0].dtype != getattr(xp, kind):\n"
         '        raise TypeError(f"the namespace makes {arrays[0].dtype} of {kind}; in JAX, first call "\n'
@@ -302,16 +302,18 @@ DIALECTS = {
         "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
         "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
         check_parameter="xp=numpy",
-        single=True,
+        has_single_precision=True,
     ),
     "numba": Dialect(
         about="Arguments are float64 arrays of one configuration: q ({nq},), v and a ({nv},).\n"
         "The first call of a function compiles the function.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages.
-        result=_in_array("np.empty({0})", ""),
-        values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
+        first_lines=_make_length_check(
+            '"{x} needs {width} numbers"'
+        ),  # Numba supports only constant messages.
+        result=_make_array_result("np.empty({0})", ""),
+        values=_EVALUATE_EACH.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
@@ -319,16 +321,16 @@ DIALECTS = {
         "XLA's fusion pass takes minutes to compile long chains; this line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        helpers=_demand("not jnp.issubdtype(x.dtype, jnp.floating)")
+        helpers=_make_check("not jnp.issubdtype(x.dtype, jnp.floating)")
         + "\n"
         + _STACKED.format(given="", xp="jnp", axis="axis"),
         first_lines=lambda writer: [
             *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
-            *_demands(writer),
+            *_check_lines(writer),
             _zero(writer, "jnp"),
         ],
         index="{}[..., {}]",
-        result=_stacked(""),
+        result=_make_stacked_result(""),
         values='unfused, wide = {"xla_disable_hlo_passes": "fusion"}, jax.config.jax_enable_x64\n'
         '    jax.config.update("jax_enable_x64", True)  # otherwise JAX computes float64 in float32\n'
         "    try:\n"
@@ -337,23 +339,25 @@ DIALECTS = {
         "        return found.reshape(len(inputs[0]), -1).tolist()\n"
         "    finally:\n"
         '        jax.config.update("jax_enable_x64", wide)',
-        single=True,
+        has_single_precision=True,
     ),
     "torch": Dialect(
         about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device,\n"
         "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
         "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
-        helpers=_demand("not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)")
+        helpers=_make_check(
+            "not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)"
+        )
         + "\n"
         + _STACKED.format(given="", xp="torch", axis="dim"),
-        first_lines=lambda writer: [*_demands(writer), _zero(writer, "torch")],
+        first_lines=lambda writer: [*_check_lines(writer), _zero(writer, "torch")],
         index="{}[..., {}]",
-        result=_stacked(""),
+        result=_make_stacked_result(""),
         values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
         "    return function(*tensors).reshape(len(inputs[0]), -1).tolist()",
         check_parameter='device="cpu"',
-        single=True,
+        has_single_precision=True,
         more_code=_torch_module,
         more_checks="    for name, good in gradients().items():\n"
         "        wrong |= not good\n"
@@ -364,9 +368,9 @@ DIALECTS = {
         "A Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
         helpers=_VECTOR,
-        first_lines=_demands,
-        result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
-        values=_ONE_BY_ONE.format(
+        first_lines=_check_lines,
+        result=_make_nested_result("casadi.vertcat(", ")", "casadi.horzcat({})"),
+        values=_EVALUATE_EACH.format(
             "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
         ),
     ),
@@ -374,17 +378,17 @@ DIALECTS = {
         about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
         "Each result is a Matrix. A Hessian has {nv} times 6 rows and {nv} columns.",
         imports="import sympy\nfrom sympy import {}",
-        first_lines=_lengths(_FOUND),
-        result=_nested("sympy.Matrix([", "])"),
-        values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
+        first_lines=_make_length_check(_LENGTH_MESSAGE),
+        result=_make_nested_result("sympy.Matrix([", "])"),
+        values=_EVALUATE_EACH.format("[float(x) for x in function(*one)]"),
     ),
     "sympy-exact": Dialect(
         about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
         "Each result is a Matrix of exact numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
         "For example: placement(sympy.symbols('q:{nq}'))",
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
-        first_lines=_lengths(_FOUND),
-        result=_nested("Matrix([", "])"),
+        first_lines=_make_length_check(_LENGTH_MESSAGE),
+        result=_make_nested_result("Matrix([", "])"),
         # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
         values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
         '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
@@ -402,8 +406,8 @@ def write(code: FrameCode, to: str) -> str:
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
-        '"""' + code.head[0],
-        *code.head[1:],
+        '"""' + code.header[0],
+        *code.header[1:],
         "",
         about,
         f"To try it: python {code.name}_{to.replace('-', '_')}.py",
@@ -426,17 +430,19 @@ def _imports(code: FrameCode, dialect: Dialect) -> str:
 def _function(code: FrameCode, function: Function, dialect: Dialect) -> Iterator[str]:
     literal: Callable[[Number], str] = repr
     if dialect.exact:
-        from urdfkin.export.exact import literal
+        from urdfkin.export.exact import format_literal
+
+        literal = format_literal
     writer = Writer(code, function, literal)
     if dialect.decorator:
         yield dialect.decorator
     yield f"def {function.name}({', '.join(function.inputs)}):"
     size = ", ".join(map(str, function.shape)) + ("," if len(function.shape) == 1 else "")
     numbers = ", ".join(function.quantity.equations)
-    yield f'    """({size}), eq. {numbers}; {function.operations} operations."""'
+    yield f'    """({size}), eq. {numbers}; {function.operation_count} operations."""'
     yield from (f"    {line}" for line in dialect.first_lines(writer))
     for node in writer.inputs:
-        yield f"    {writer.names[node]} = {dialect.index.format(node.op, node.of[0])}"
+        yield f"    {writer.names[node]} = {dialect.index.format(node.op, node.operands[0])}"
     for head, lines in writer.statements():
         yield f"    # {head}"
         yield from (f"    {name} = {value}" for name, value in lines)
@@ -478,13 +484,13 @@ if __name__ == "__main__":
 '''
 
 
-_DOUBLE = '[("float64", 2.0**-52, WITHIN)]'
-_BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
+_DOUBLE_PRECISION = '[("float64", 2.0**-52, WITHIN)]'
+_BOTH_PRECISIONS = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
 def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
     yield "\n# Test vectors: inputs, true values at fifty digits, and tolerances in eps = 2^-52."
-    if dialect.single:
+    if dialect.has_single_precision:
         yield "# SINGLE contains tolerances in single precision, in eps = 2^-23."
     vectors = code.proof.vectors
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
@@ -494,38 +500,42 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
         yield from (f"        {v.inputs[k]!r}," for v in vectors)
         yield "    ],"
     yield "}"
-    tables = [("TRUE", "results", '"{}"'), ("WITHIN", "within", "{}"), ("SINGLE", "single", "{}")]
-    for what, of, form in tables if dialect.single else tables[:2]:
-        yield f"{what} = {{"
+    tables = [
+        ("TRUE", "results", '"{}"'),
+        ("WITHIN", "tolerances", "{}"),
+        ("SINGLE", "single_tolerances", "{}"),
+    ]
+    for constant, attribute, form in tables if dialect.has_single_precision else tables[:2]:
+        yield f"{constant} = {{"
         for function in code.functions:
             yield f'    "{function.name}": ['
             for vector in vectors:
                 yield "        ["
-                values = [form.format(x) for x in getattr(vector, of)[function.name]]
-                for row in _rows(values, 2 if what == "TRUE" else 4):
+                values = [form.format(x) for x in getattr(vector, attribute)[function.name]]
+                for row in _rows(values, 2 if constant == "TRUE" else 4):
                     yield f"            {', '.join(row)},"
                 yield "        ],"
             yield "    ],"
         yield "}"
     yield _CHECK.format(
         values=dialect.values,
-        kinds=_BOTH if dialect.single else _DOUBLE,
-        told=" ({kind})" if dialect.single else "",
+        kinds=_BOTH_PRECISIONS if dialect.has_single_precision else _DOUBLE_PRECISION,
+        told=" ({kind})" if dialect.has_single_precision else "",
         given=dialect.check_parameter,
         more=f", {dialect.check_parameter.partition('=')[0]}" if dialect.check_parameter else "",
-        functions=_all(code),
+        functions=_function_list(code),
         classes=dialect.more_code(code),
         after=dialect.more_checks,
     ).rstrip()
 
 
 def torch_module(text: str) -> Any:
-    need_torch()
+    require_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)
     return scope["Kinematics"]()
 
 
-def need_torch() -> None:
+def require_torch() -> None:
     if importlib.util.find_spec("torch") is None:
         raise InputError("robot.torch needs PyTorch", found="no module torch", remedy="pip install torch")

@@ -88,10 +88,10 @@ class TreeRecursion(Recursion):
                 length = self.kind.root(sum(c * c for c in quaternion))
                 S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
                 return self.after_floating(s, q[at:], S, v[rate_at:], a[rate_at:])
-            case JointMotion.TURN:
+            case JointMotion.REVOLUTE:
                 value, *rates = self._own_values(i)
                 return self.after_revolute(s, _Z, self._about_z(value), *rates)
-            case JointMotion.SLIDE:
+            case JointMotion.PRISMATIC:
                 return self.after_prismatic(s, _Z, *self._own_values(i))
             case _:
                 assert_never(motion)
@@ -108,7 +108,14 @@ class TreeRecursion(Recursion):
             s = self.states[row[ColumnField.STEP]]
             z = self.eq.transposed(s.R)[row[ColumnField.AXIS]]
             found.append(
-                Column(z, bool(row[ColumnField.TURNS]), s, row[ColumnField.STEP], row[ColumnField.V], factor)
+                Column(
+                    z,
+                    bool(row[ColumnField.IS_ROTATION]),
+                    s,
+                    row[ColumnField.STEP],
+                    row[ColumnField.V],
+                    factor,
+                )
             )
         return found
 

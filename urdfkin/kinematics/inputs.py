@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import is_real, safe_repr
-from urdfkin.system.lazy_import import is_a
+from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
 
 def _is_masked(value: object) -> bool:
     """Return whether any element is masked; `np.asarray` ignores the mask of an array."""
-    if is_a(value, "numpy.ma:MaskedArray"):
+    if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 

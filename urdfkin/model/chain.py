@@ -98,7 +98,7 @@ class FrameChain(Displayable):
     def __repr__(self) -> str:
         return log_line(f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>")
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         heads = ("joint", "kind", "lower", "upper", "x", "y", "z", "axis x", "axis y", "axis z")
         geometry = zip(self.joints, self.origins().tolist(), self.axes().tolist(), strict=False)
         rows = [

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
+from urdfkin.errors.numbers import number_remedy, parse_float, parse_quantity
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, as_floats
 
@@ -198,7 +198,7 @@ with 'neutral, elbow=...'
         quantity = parse_quantity(text)
         value = parse_float(text) if quantity is None else quantity.value
         if value is None:
-            hint = remedy(text) or "write 0.5, 30deg, pi/2 or 5mm"
+            hint = number_remedy(text) or "write 0.5, 30deg, pi/2 or 5mm"
             raise InputError("not a finite number", where=where, found=repr(text.strip()[:60]), remedy=hint)
         if quantity is None:
             return value
@@ -293,4 +293,9 @@ def _is_pose_name(text: str) -> bool:
 
     Such a text begins with a letter, contains no `=`, and does not look like a number.
     """
-    return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None
+    return (
+        text[:1].isalpha()
+        and "=" not in text
+        and parse_quantity(text) is None
+        and number_remedy(text) is None
+    )

@@ -44,7 +44,7 @@ class JointTable(dict[str, Joint], Displayable):
         super().__init__((joint.name, joint) for joint in tree.joints)
         self._tree = tree
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         tree = self._tree
         columns = COLUMNS if any(joint.mimic for joint in self.values()) else COLUMNS[:-1]
         links = zip(tree.joints, tree.links[1:], strict=True)

@@ -13,7 +13,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 
 #: Residuals below this fraction of the noise are only rounding errors.
 _ROUNDING = 0.5
@@ -152,4 +152,4 @@ def as_data(calibration: Calibration) -> dict[str, Any]:
         "placements": {name: T for name, T in names if T is not None},
         "origins": calibration.origins,
     }
-    return cast("dict[str, Any]", plain(data))
+    return cast("dict[str, Any]", as_json_data(data))

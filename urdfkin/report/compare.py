@@ -41,7 +41,7 @@ from urdfkin.report.words import (
     summary,
     worst,
 )
-from urdfkin.system.documents import DocumentKind, Header, plain, says
+from urdfkin.system.documents import DocumentKind, Header, as_json_data, doc
 from urdfkin.validation.document import (
     Document,
     ReportedCheck,
@@ -229,17 +229,17 @@ class ReportComparison:
             "command": command,
             "changes": self.changes,
         }
-        return cast("ComparisonDocument", plain(document))
+        return cast("ComparisonDocument", as_json_data(document))
 
 
 class ChangeEntry(TypedDict):
     """A difference between two reports."""
 
-    robot: Annotated[str | None, says("Source of the robot; null if the value does not belong to one robot.")]
-    what: Annotated[str, says("Name of the changed value.")]
-    old: Annotated[str, says("Value in the old report; empty if the old report has none.")]
-    new: Annotated[str, says("Value in the new report; empty if the new report has none.")]
-    regression: Annotated[bool, says("Whether the change is a regression.")]
+    robot: Annotated[str | None, doc("Source of the robot; null if the value does not belong to one robot.")]
+    what: Annotated[str, doc("Name of the changed value.")]
+    old: Annotated[str, doc("Value in the old report; empty if the old report has none.")]
+    new: Annotated[str, doc("Value in the new report; empty if the new report has none.")]
+    regression: Annotated[bool, doc("Whether the change is a regression.")]
 
 
 class ComparisonDocument(Header):
@@ -248,7 +248,7 @@ class ComparisonDocument(Header):
     The header entry `sha256` contains the SHA-256 of each robot's text in the new report.
     """
 
-    changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
+    changes: Annotated[list[ChangeEntry], doc("All changes between the two reports.")]
 
 
 COMPARISON = DocumentKind(

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, cast
 
-from urdfkin.comparison.diff import Changes, ModelChange, motion_words, word
+from urdfkin.comparison.diff import Changes, ModelChange, displacement_text, format_value
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, count_within, row_line, shorten, table_lines
 from urdfkin.report.words import format_count
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 
 HEADS = ("element", "what", "old", "new", "alone")
 
@@ -28,7 +28,7 @@ def headline(found: Changes) -> str:
     head = format_count(len(found.changes), "change") + rounding
     if found.total is None:
         return f"{head}, no effect on motion" if not any(c.moves for c in found.changes) else head
-    return f"{head}; together they {motion_words(found.total)}"
+    return f"{head}; together they {displacement_text(found.total)}"
 
 
 PAIRS = ("old", "new", "changes")
@@ -71,7 +71,7 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
     for change in found.changes:
         effect = found.effect_of.get(change.element)
         motion = effect.words if effect and change.moves else ""
-        old, new = ("" if value is None else word(value) for value in (change.old, change.new))
+        old, new = ("" if value is None else format_value(value) for value in (change.old, change.new))
         new = change.size or new
         if longest is not None:
             old, new = shorten(old, longest), shorten(new, longest)
@@ -115,4 +115,4 @@ def as_data(found: Changes) -> dict[str, Any]:
         "total": far(found.total),
         "rounding": found.rounding and dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
-    return cast("dict[str, Any]", plain(data))
+    return cast("dict[str, Any]", as_json_data(data))

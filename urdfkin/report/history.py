@@ -30,8 +30,8 @@ from urdfkin.report.words import (
     utc,
     worst,
 )
-from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
-from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
+from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, as_json_data, doc, parse_json
+from urdfkin.system.files import MAX_BYTES, is_folder, read_bytes, shorten_path
 from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
@@ -51,64 +51,64 @@ _LOWEST = -3.0
 class ValidationRun(TypedDict):
     """One validation run, as the history lists it."""
 
-    file: Annotated[str, says("The report: a JSON file, or the folder of `validate --store`.")]
-    started: Annotated[str, says("Start time, ISO 8601, UTC.")]
-    verdict: Annotated[str, says("The verdict of the run.")]
-    reason: Annotated[str | None, says("Reason why the run has not passed; null if the run has passed.")]
-    samples: Annotated[Count, says("Number of random configurations for each robot.")]
-    seed: Annotated[int, says("Seed of the random samples.")]
-    robots: Annotated[Count, says("Number of robots.")]
-    results: Annotated[Count, says("Number of compared results.")]
-    failed: Annotated[Count, says("Number of results outside their bound.")]
+    file: Annotated[str, doc("The report: a JSON file, or the folder of `validate --store`.")]
+    started: Annotated[str, doc("Start time, ISO 8601, UTC.")]
+    verdict: Annotated[str, doc("The verdict of the run.")]
+    reason: Annotated[str | None, doc("Reason why the run has not passed; null if the run has passed.")]
+    samples: Annotated[Count, doc("Number of random configurations for each robot.")]
+    seed: Annotated[int, doc("Seed of the random samples.")]
+    robots: Annotated[Count, doc("Number of robots.")]
+    results: Annotated[Count, doc("Number of compared results.")]
+    failed: Annotated[Count, doc("Number of results outside their bound.")]
     bound_ratio: Units
-    versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
+    versions: Annotated[dict[str, str], doc("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
-        list[ChangeEntry], says("Changes since the previous run, as `urdfkin report compare` lists them.")
+        list[ChangeEntry], doc("Changes since the previous run, as `urdfkin report compare` lists them.")
     ]
 
 
 class Point(TypedDict):
     """The results of one robot in one validation run."""
 
-    run: Annotated[Count, says("Index of the run.")]
-    source: Annotated[str, says("The robot's source in this run.")]
-    verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], says("The verdict.")]
-    reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
-    sha256: Annotated[Sha256 | None, says("Digest of the robot's text; null if it could not be read.")]
-    samples: Annotated[Count, says("Number of compared configurations.")]
-    results: Annotated[Count, says("Number of compared results.")]
-    failed: Annotated[Count, says("Number of results outside their bound.")]
+    run: Annotated[Count, doc("Index of the run.")]
+    source: Annotated[str, doc("The robot's source in this run.")]
+    verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], doc("The verdict.")]
+    reason: Annotated[str | None, doc("Reason why the robot is not verified; null if it is verified.")]
+    sha256: Annotated[Sha256 | None, doc("Digest of the robot's text; null if it could not be read.")]
+    samples: Annotated[Count, doc("Number of compared configurations.")]
+    results: Annotated[Count, doc("Number of compared results.")]
+    failed: Annotated[Count, doc("Number of results outside their bound.")]
     worst: Units
     bound_ratio: Annotated[
         float | None,
-        says("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
+        doc("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
     ]
-    errors: Annotated[Count, says("Number of errors in the file.")]
-    warnings: Annotated[Count, says("Number of warnings in the file.")]
-    notes: Annotated[Count, says("Number of notes on the file.")]
+    errors: Annotated[Count, doc("Number of errors in the file.")]
+    warnings: Annotated[Count, doc("Number of warnings in the file.")]
+    notes: Annotated[Count, doc("Number of notes on the file.")]
 
 
 class RobotHistory(TypedDict):
     """The results of one robot in all validation runs with this robot."""
 
-    robot: Annotated[str, says("The robot's latest source.")]
-    points: Annotated[list[Point], says("The runs of this robot, the oldest first.")]
+    robot: Annotated[str, doc("The robot's latest source.")]
+    points: Annotated[list[Point], doc("The runs of this robot, the oldest first.")]
 
 
 class Unused(TypedDict):
     """A file that is left out of the history, with the reason."""
 
-    file: Annotated[str, says("The file.")]
-    reason: Annotated[str, says("Why the file is not used.")]
+    file: Annotated[str, doc("The file.")]
+    reason: Annotated[str, doc("Why the file is not used.")]
 
 
 class HistoryDocument(Header):
     """The output of `urdfkin report history --format json`, with verdict and `sha256` of the latest run."""
 
-    runs: Annotated[list[ValidationRun], says("The runs, the oldest first.")]
-    robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
-    unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], says("Files that contain the same validation run as another file.")]
+    runs: Annotated[list[ValidationRun], doc("The runs, the oldest first.")]
+    robots: Annotated[list[RobotHistory], doc("The robots; worse verdicts first.")]
+    unusable: Annotated[list[Unused], doc("Files that cannot be used, each with the reason.")]
+    repeated: Annotated[list[Unused], doc("Files that contain the same validation run as another file.")]
 
 
 HISTORY = DocumentKind(
@@ -146,7 +146,7 @@ class History:
             "unusable": self.unusable,
             "repeated": self.repeated,
         }
-        return cast("HistoryDocument", plain(document))
+        return cast("HistoryDocument", as_json_data(document))
 
 
 def read_history(paths: Sequence[Path]) -> History:
@@ -164,9 +164,9 @@ def read_history(paths: Sequence[Path]) -> History:
         some = "; ".join(f"{one['file']}: {one['reason']}" for one in history.unusable[:3])
         raise InputError(
             "no report to show",
-            where=", ".join(shortened(path) for path in paths[:3]),
+            where=", ".join(shorten_path(path) for path in paths[:3]),
             found=some or "no .json file and no folder of `validate --store`",
-            remedy=f"write one with: {VALIDATION.made_by}",
+            remedy=f"write one with: {VALIDATION.command}",
         )
 
     def rank(item: tuple[str, list[Point]]) -> tuple[bool, int]:
@@ -186,7 +186,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
             if count > MOST_RUNS:
                 raise InputError(
                     f"more than {MOST_RUNS:,} reports",
-                    where=shortened(path),
+                    where=shorten_path(path),
                     remedy="pass fewer files, or a folder with fewer files",
                 )
             yield file
@@ -205,7 +205,9 @@ def _in_folder(folder: Path) -> Iterator[Path]:
         seen += len(names)
         if seen > MOST_FILES:
             raise InputError(
-                f"more than {MOST_FILES:,} files", where=shortened(folder), remedy="name the reports' folder"
+                f"more than {MOST_FILES:,} files",
+                where=shorten_path(folder),
+                remedy="name the reports' folder",
             )
         yield from (here / name for name in sorted(names) if name.endswith(".json"))
 
@@ -243,7 +245,7 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 def _start(path: Path) -> tuple[float, str]:
     """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
-    data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
+    data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)
     return moment.timestamp() if moment else math.inf, text
@@ -252,7 +254,7 @@ def _start(path: Path) -> tuple[float, str]:
 def _read_report(path: Path) -> Document:
     if is_folder(path):
         return read_stored_document(path)
-    return check_document(parse_json(read_bytes(path, MOST), str(path)), str(path))
+    return check_document(parse_json(read_bytes(path, MAX_BYTES), str(path)), str(path))
 
 
 def _run(file: str, document: Document, before: Document | None) -> ValidationRun:
@@ -269,7 +271,9 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
         "failed": sum(robot["failed"] for robot in robots),
         "bound_ratio": worst(map(bound_ratio_of, robots)),
         "versions": document["versions"],
-        "changes": cast("list[ChangeEntry]", plain(compare(before, document).changes)) if before else [],
+        "changes": cast("list[ChangeEntry]", as_json_data(compare(before, document).changes))
+        if before
+        else [],
     }
 
 

@@ -41,7 +41,7 @@ from urdfkin.report.words import (
     worst,
     worst_cell,
 )
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement, describe
 from urdfkin.verify.quantities import compared, not_compared
@@ -79,7 +79,7 @@ def environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     environment.filters["format_count"] = format_count
-    environment.globals["install_remedy"] = install_remedy
+    environment.globals["install_command"] = install_command
     return environment
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from urdfkin.errors.display import ASCII, Matrix, Table, TextDocument
-from urdfkin.errors.escape import printable
+from urdfkin.errors.display import ASCII_TREE_LINES, Matrix, Table, TextDocument
+from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -54,7 +54,7 @@ def print_table(out: Console, table: Table) -> None:
     out.print(("-" if ascii_only else "\u2500") * rule)
     name = None
     for row in rows:
-        first, *rest = (cell.translate(ASCII) if ascii_only else cell for cell in row)
+        first, *rest = (cell.translate(ASCII_TREE_LINES) if ascii_only else cell for cell in row)
         show(["" if first == name and not roomy else first, *rest])
         name = first
 
@@ -67,5 +67,7 @@ def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
     from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")
-    heads, rows = ([[printable(cell) for cell in row] for row in part] for part in (lines, table.cells()))
+    heads, rows = (
+        [[escape_unprintable(cell) for cell in row] for row in part] for part in (lines, table.cells())
+    )
     return heads, rows, [max(map(cell_len, column)) for column in zip(*heads, *rows, strict=True)]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from itertools import accumulate
 
-from urdfkin.errors.escape import markdown_code, printable
+from urdfkin.errors.escape import escape_unprintable, markdown_code
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.words import (
     VERDICTS,
@@ -144,7 +144,7 @@ def fence_code(code: str) -> str:
     """Return a code block with a fence longer than any run of backticks inside."""
     longest = max((len(run) for run in re.findall("`+", code)), default=0)
     fence = "`" * max(3, longest + 1)
-    lines = "\n".join(map(printable, code.split("\n")))
+    lines = "\n".join(map(escape_unprintable, code.split("\n")))
     return f"{fence}sh\n{lines}\n{fence}"
 
 

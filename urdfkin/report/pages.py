@@ -228,12 +228,12 @@ def _dh_cells(row: ReportedDHRow, beta: bool) -> list[str]:
 
 
 def _length(metres: float) -> str:
-    return _READABLE.length(metres).replace("-", "−")
+    return _READABLE.format_length(metres).replace("-", "−")
 
 
 def angle(radians: float) -> str:
     """Format an angle; an exact multiple of pi/12 is written with π."""
-    return _READABLE.angle(radians, pi="π").replace("-", "−")
+    return _READABLE.format_angle(radians, pi="π").replace("-", "−")
 
 
 def accuracy_rows(study: ReportedAccuracy) -> list[dict[str, Any]]:

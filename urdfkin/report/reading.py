@@ -322,13 +322,13 @@ def read_stored_document(folder: Path) -> Document:
 
 
 def check_document(data: object, where: str) -> Document:
-    document = VALIDATION.checked(data, where)
+    document = VALIDATION.validate(data, where)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""
         raise InputError(
             "the report contradicts itself",
             where=where,
             found="; ".join(against[:_SHOWN]) + more,
-            remedy=f"make the report again: {VALIDATION.made_by}",
+            remedy=f"make the report again: {VALIDATION.command}",
         )
     return document

@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion, Verdict, angle, length, up_to
+from urdfkin.comparison.result import (
+    BOUNDED_DIFFERENCES,
+    Interval,
+    Sameness,
+    SameQuestion,
+    Verdict,
+    angle,
+    length,
+    up_to,
+)
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
@@ -47,8 +56,8 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if question.within is not None:
         return _within(sameness, question.within) + besides
     off = "the distance of the frames has no bound"
-    if math.isfinite(max(sameness.written)):
-        off = f"in every configuration no frame is off by more than {_both(*sameness.written)}"
+    if math.isfinite(max(sameness.bound_as_written)):
+        off = f"in every configuration no frame is off by more than {_both(*sameness.bound_as_written)}"
     if sameness.up_to_single:
         cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
@@ -75,15 +84,17 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 def _within(sameness: Sameness, most: float) -> str:
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if sameness.within(most):
-        return f"{limit}no frame is ever off by more than {_both(*sameness.written)}"
-    if (beyond := next((one for one in sameness.differences if one.what not in BOUNDED), None)) is not None:
+        return f"{limit}no frame is ever off by more than {_both(*sameness.bound_as_written)}"
+    if (
+        beyond := next((one for one in sameness.differences if one.what not in BOUNDED_DIFFERENCES), None)
+    ) is not None:
         return f"NOT {limit}{beyond.words}"
     frames = (sameness.as_written,) if sameness.as_written is not None else sameness.frames
     far = [one for one in frames if one.lower > most or one.radians_seen > most]
     if far:
         worst = max(far, key=lambda one: (one.lower, one.radians_seen))
         return f"NOT {limit}{worst.frame} is {_off(worst, sameness.rounding)} off"
-    return f"NOT {limit}the proven bound is {_both(*sameness.written)}"
+    return f"NOT {limit}the proven bound is {_both(*sameness.bound_as_written)}"
 
 
 def _both(metres: float, radians: float) -> str:
@@ -204,7 +215,7 @@ def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: b
     parts += _lines(NARROWED, sameness.narrowed, some)
     parts += _lines("different names", describe_renames(sameness), some)
     parts += _lines("differences without effect on motion", [one.words for one in sameness.remarks], some)
-    return TextDocument("", [*parts, str(sameness.checked)])
+    return TextDocument("", [*parts, str(sameness.confirmation)])
 
 
 def _names(sameness: Sameness) -> list[str]:
@@ -233,7 +244,7 @@ def _pair_rows(pairs: Sequence[Sameness], question: SameQuestion) -> list[tuple[
             words = "differs within single precision"
         if question.within is not None:
             words = f"{'' if one.within(question.within) else 'not '}within {question.within:g}"
-        metres, radians = one.written
+        metres, radians = one.bound_as_written
         off = "no bound" if math.isinf(metres) else _both(metres, radians)
         single = "" if one.single is None else _both(*one.single)
         rows.append((*one.sources, words, off, single))
@@ -269,7 +280,7 @@ def as_document(sameness: Sameness) -> TextDocument:
         parts += [f"{frames_heading(sameness)}:", Table(HEADS, frame_rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         parts += _worst_case(sameness, frames)
-    return TextDocument(headline(sameness), [*parts, str(sameness.checked)])
+    return TextDocument(headline(sameness), [*parts, str(sameness.confirmation)])
 
 
 def distance_text(frame: Interval) -> str:
@@ -314,7 +325,7 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if frames:
         cells = (map(text, row) for row in frame_rows(frames[: 4 * SHOWN]))
         lines += [f"{frames_heading(sameness)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
-    return "\n".join([*lines, text(str(sameness.checked)), ""])
+    return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
 #: Half the side length of a picture (units of the SVG), and fraction of the picture that the robots fill.

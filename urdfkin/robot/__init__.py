@@ -24,15 +24,7 @@ from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.errors import InputError, RangeError, RepresentationSingularityError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.errors.validators import (
-    as_bool,
-    as_choice,
-    as_names,
-    as_str,
-    real_number,
-    safe_repr,
-    whole_number,
-)
+from urdfkin.errors.validators import as_bool, as_choice, as_finite_float, as_int, as_names, as_str, safe_repr
 from urdfkin.export import QUANTITIES as EXPORTED
 from urdfkin.kinematics.inputs import as_finite, as_vectors
 from urdfkin.kinematics.rotation import NEAREST
@@ -45,8 +37,8 @@ from urdfkin.model.configuration_like import ConfigurationLike, join_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.summary import JointTable, summarize
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
-from urdfkin.system.lazy_import import hook
-from urdfkin.system.locks import importing
+from urdfkin.system.lazy_import import get_hook
+from urdfkin.system.locks import import_lock
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, find_entry
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
@@ -85,9 +77,9 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 #: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
 #: Internal members that `dir(robot)` leaves out, so that name completion does not offer them.
-_INTERNAL = {"plan", "verifier"}
+_INTERNAL_NAMES = {"plan", "verifier"}
 #: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
-_MOST_NUMBERS = (2**63 - 1) // 8
+_MAX_NUMBERS = (2**63 - 1) // 8
 
 
 class Robot(Displayable):
@@ -188,13 +180,13 @@ class Robot(Displayable):
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
-        return [name for name in super().__dir__() if name not in _INTERNAL]
+        return [name for name in super().__dir__() if name not in _INTERNAL_NAMES]
 
-    def _sheet(self) -> TextDocument:
-        with importing:
-            from urdfkin.system.plain_xml import order_words
+    def _text_document(self) -> TextDocument:
+        with import_lock:
+            from urdfkin.system.plain_xml import joint_order_sentence
 
-        order = order_words(self.urdf, self.joint_names)
+        order = joint_order_sentence(self.urdf, self.joint_names)
         return summarize(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: ConfigurationLike = "ready", *, height: int = 480) -> Any:
@@ -217,7 +209,7 @@ class Robot(Displayable):
         q_0 = configuration.parse_finite(self.tree, q, "q")
         if q_0.ndim != 1:
             raise InputError("q of a view must be one configuration", found=f"shape {q_0.shape}")
-        return hook("a robot in a cell")(self, q_0, whole_number(height, "height", 1, 10_000))
+        return get_hook("a robot in a cell")(self, q_0, as_int(height, "height", 1, 10_000))
 
     # -- description ---------------------------------------------------------------------------------
 
@@ -506,8 +498,8 @@ class Robot(Displayable):
         >>> q.shape, arm.limit_violations(q)
         ((5, 2), [])
         """
-        n = whole_number(n, "n", 0, _MOST_NUMBERS // max(1, self.nq))
-        seed = whole_number(seed, "seed", 0)
+        n = as_int(n, "n", 0, _MAX_NUMBERS // max(1, self.nq))
+        seed = as_int(seed, "seed", 0)
         try:
             return sample(self.tree, n, np.random.default_rng(seed))
         except MemoryError:
@@ -671,7 +663,7 @@ class Robot(Displayable):
         >>> isaaclab.to(a1.neutral()).shape
         (12,)
         """
-        with importing:
+        with import_lock:
             from urdfkin.model.conventions import Conversion, find_convention
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
@@ -688,12 +680,12 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], [1.0, 0.0], "tip").tolist()  # angular first
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.robot.convention_robot import ConventionRobot
 
         return ConventionRobot(self, self.convention(name, joints))
 
-    def locked(
+    def with_locked_joints(
         self, lock: str | Mapping[str, ArrayLike] = MappingProxyType({}), joints: Sequence[str] | None = None
     ) -> Robot:
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
@@ -713,10 +705,10 @@ class Robot(Displayable):
                 (planar, floating, fixed).
 
         >>> import urdfkin
-        >>> panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04})
+        >>> panda = urdfkin.load("panda").with_locked_joints({"panda_finger_joint1": 0.04})
         >>> panda.nq, panda.jacobian("ready", "panda_hand_tcp").shape
         (7, (6, 7))
-        >>> elbow = urdfkin.load("planar_two_link").locked(joints=["joint_2"])
+        >>> elbow = urdfkin.load("planar_two_link").with_locked_joints(joints=["joint_2"])
         >>> elbow.velocity_names, elbow.joints["joint_1"].lock.value
         (('joint_2',), 0.0)
         """
@@ -765,7 +757,7 @@ class Robot(Displayable):
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
             raise InputError(f"the {name} takes ({', '.join(row.inputs)})", found=safe_repr(inputs))
-        return self._computed(name, inputs, frame, reference, base, out, verify, threads)
+        return self._compute_array(name, inputs, frame, reference, base, out, verify, threads)
 
     def placement(
         self,
@@ -787,10 +779,10 @@ class Robot(Displayable):
         >>> arm.placement([[0.0, 0.0], [0.1, 0.2]], ["link_2", "tip"]).shape
         (2, 2, 4, 4)
         """
-        fast = self._fast(frame, _ALIGNED, base, verify, threads)
+        fast = self._find_evaluator(frame, _ALIGNED, base, verify, threads)
         if fast and (result := fast._placement(q, out)) is not None:
             return result
-        return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
+        return self._compute_array("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
     def relative_placement(
         self,
@@ -816,7 +808,7 @@ class Robot(Displayable):
         >>> arm.relative_placement([0.0, 0.0], "tip", "link_2")[:3, 3].tolist()
         [0.4, 0.0, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
@@ -850,10 +842,10 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], {"joint_1": 1.0, "joint_2": 0.0}).round(6).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._velocity(q, v, out)) is not None:
             return result
-        return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
+        return self._compute_array("velocity", (q, v), frame, reference, base, out, verify, threads)
 
     def jacobian(
         self,
@@ -877,10 +869,10 @@ class Robot(Displayable):
         >>> J[:2].round(6).tolist()
         [[-0.4, -0.4], [0.5, 0.0]]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._jacobian(q, out)) is not None:
             return result
-        return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
+        return self._compute_array("jacobian", (q,), frame, reference, base, out, verify, threads)
 
     def jacobian_rate(
         self,
@@ -907,7 +899,7 @@ class Robot(Displayable):
         >>> arm.jacobian_rate([0.0, 0.0], [1.0, 0.0], "tip")[0].tolist()  # of the x row, 1/s
         [-0.9, -0.4]
         """
-        return self._computed("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
+        return self._compute_array("jacobian rate", (q, v), frame, reference, base, out, verify, threads)
 
     def hessian(
         self,
@@ -948,10 +940,10 @@ class Robot(Displayable):
         >>> H[0].tolist()  # x row, m/rad: the second derivatives of x = 0.5 cos q1 + 0.4 cos(q1 + q2)
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._hessian(q, out)) is not None:
             return result
-        return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
+        return self._compute_array("hessian", (q,), frame, reference, base, out, verify, threads)
 
     def acceleration(
         self,
@@ -980,10 +972,10 @@ class Robot(Displayable):
         >>> arm.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(6).tolist()  # -w^2 r, r = 0.9 m
         [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
-        fast = self._fast(frame, reference, base, verify, threads)
+        fast = self._find_evaluator(frame, reference, base, verify, threads)
         if fast and (result := fast._acceleration(q, v, a, out)) is not None:
             return result
-        return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
+        return self._compute_array("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
     def imu(
         self,
@@ -1019,7 +1011,7 @@ class Robot(Displayable):
         g = as_vectors(gravity, "gravity")
         if g.shape != (3,):
             raise InputError("gravity must be one vector (3,)", found=f"shape {g.shape}")
-        return self._computed(
+        return self._compute_array(
             "imu", (q, v, a), frame, Reference.LOCAL, base, out, verify, threads, gravity=g.tolist()
         )
 
@@ -1075,7 +1067,7 @@ class Robot(Displayable):
             self.velocity_names,
             axis_kinds(self.tree),
             active,
-            partial(self._sampled, frame),
+            partial(self._sample_jacobians, frame),
             moving_base=base is not None,
         )
         return singular_values(J, error, active[which].any(axis=0), which, columns)
@@ -1121,7 +1113,10 @@ class Robot(Displayable):
         >>> J.shape, J[5].tolist()  # yaw = q1 + q2
         ((6, 2), [1.0, 1.0])
         """
-        representation, nearest = as_str(representation, "representation"), real_number(nearest, "nearest")
+        representation, nearest = (
+            as_str(representation, "representation"),
+            as_finite_float(nearest, "nearest"),
+        )
         representation = "xyz" if representation == "rpy" else representation
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
@@ -1144,10 +1139,10 @@ class Robot(Displayable):
             except RepresentationSingularityError as error:
                 too_near.append((error.distance, part.start + error.sample[0]))
 
-        with importing:
-            from urdfkin.compiled.evaluate import in_parts
+        with import_lock:
+            from urdfkin.compiled.evaluate import compute_in_parts
 
-        in_parts(compute, call.n, threads)
+        compute_in_parts(compute, call.n, threads)
         if too_near:
             distance, k = min(too_near)
             raise RepresentationSingularityError(representation, distance, call.index(k))
@@ -1192,13 +1187,13 @@ class Robot(Displayable):
         joint_1  centripetal   -0.9      0      0      0      0      0
         sum                    -0.9      0      0      0      0      0
         """
-        with importing:
-            from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
+        with import_lock:
+            from urdfkin.compiled.breakdown import ACCELERATION_KINDS, AccelerationBreakdown, moving_joints
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.require_pinocchio(verify)
-        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
+        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(ACCELERATION_KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
             ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
@@ -1253,7 +1248,7 @@ class Robot(Displayable):
         >>> bool((proof.jacobian.error(J) < 4e-16).all())
         True
         """
-        with importing:
+        with import_lock:
             from urdfkin.verify.exact.enclosure import enclose
 
         frame = self._default_frame() if frame is None else frame
@@ -1287,10 +1282,10 @@ class Robot(Displayable):
         """
         frame = self._default_frame() if frame is None else frame
         prepared = self._prepare(frame, reference, verify=as_bool(verify, "verify"))
-        prepared.wanted = True
+        prepared.always_load = True
         return prepared
 
-    def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
+    def compile(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """Return the fastest evaluator of one frame: machine code for this robot.
 
         At the first call of a quantity, the system's C compiler compiles the code in a few seconds. A cache
@@ -1307,11 +1302,11 @@ class Robot(Displayable):
             VerificationError: at the first call, if Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
-        >>> tip = urdfkin.load("planar_two_link").compiled("tip")
+        >>> tip = urdfkin.load("planar_two_link").compile("tip")
         >>> tip.placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        with importing:
+        with import_lock:
             from urdfkin.export.compiled_frame import CompiledFrame
 
         frame = self._default_frame() if frame is None else frame
@@ -1363,8 +1358,8 @@ class Robot(Displayable):
         """
         frame, form = as_choice(frame, self.tip_frame, "frame"), as_str(form, "form")
         name = None if name is None else as_str(name, "name")
-        code = hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
-        return str(hook("code in a language")(code, as_str(to, "to")))
+        code = get_hook("code of a robot")(self, frame, quantities, reference, form, name=name, verify=verify)
+        return str(get_hook("code in a language")(code, as_str(to, "to")))
 
     def torch(
         self,
@@ -1398,10 +1393,10 @@ class Robot(Displayable):
         >>> "class Kinematics(torch.nn.Module):" in robot.export("torch", "tip")
         True
         """
-        with importing:
-            from urdfkin.export.python import need_torch, torch_module
+        with import_lock:
+            from urdfkin.export.python import require_torch, torch_module
 
-        need_torch()
+        require_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
 
     # -- chains and Denavit-Hartenberg tables ---------------------------------------------------------
@@ -1466,7 +1461,7 @@ class Robot(Displayable):
 
         The table's methods take only the coordinates of the joints in the table, in the order of
         `table.joint_names`. `robot.select(table, q)` selects these coordinates from q.
-        `urdfkin.dh.dh_table` explains the arguments in full.
+        `urdfkin.dh.make_dh_table` explains the arguments in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1506,15 +1501,15 @@ class Robot(Displayable):
             >>> urdfkin.load("ur5").dh("tool0", "base", snap=1e-6).rows[3].d
             0.10915
         """
-        with importing:
-            from urdfkin.dh.make import dh_table
+        with import_lock:
+            from urdfkin.dh.make import make_dh_table
             from urdfkin.dh.table import DHTable
 
         if not isinstance(like, DHTable | None):
             raise InputError(
                 "like must be a table", found=safe_repr(like), remedy="read one with urdfkin.read_table(FILE)"
             )
-        table = dh_table(
+        table = make_dh_table(
             self.tree,
             as_choice(tip, self.tip_frame, "tip"),
             as_choice(base, self.base_frame, "base"),
@@ -1553,11 +1548,11 @@ class Robot(Displayable):
             >>> urdfkin.load("planar_two_link").screws("tip", "base").space[1].tolist()  # [w; v]
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
-        with importing:
-            from urdfkin.dh.screws import screws_of
+        with import_lock:
+            from urdfkin.dh.screws import make_screws
             from urdfkin.verify.conversions import check_screws
 
-        found = screws_of(self.chain(tip, base))
+        found = make_screws(self.chain(tip, base))
         if self.verifier.policy_of_call(verify):
             check_screws(self.verifier, found)
         return found
@@ -1576,10 +1571,10 @@ class Robot(Displayable):
         >>> [(row.joint, row.d) for row in urdfkin.load("planar_two_link").tree_parameters().rows]
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
-        with importing:
-            from urdfkin.dh.tree_parameters import tree_parameters
+        with import_lock:
+            from urdfkin.dh.tree_parameters import make_tree_parameters
 
-        parameters = tree_parameters(self.tree)
+        parameters = make_tree_parameters(self.tree)
         if self.verifier.policy_of_call(verify):
             self.verifier.tree_parameters(parameters)
         return parameters
@@ -1606,7 +1601,7 @@ class Robot(Displayable):
             plan = self._plans[key] = compile_tree(self.tree, key)
         return plan
 
-    def _computed(
+    def _compute_array(
         self,
         name: str,
         inputs: Sequence[ConfigurationLike],
@@ -1631,20 +1626,20 @@ class Robot(Displayable):
             base=call.state,
             out=to,
             threads=threads,
-            read=self.verifier.policy_of_call(verify) is True,
+            keep_in_cache=self.verifier.policy_of_call(verify) is True,
             **options,
         )
         result = call.in_shape(results) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
 
-    def _sampled(self, frame: str) -> FloatArray:
+    def _sample_jacobians(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
         J: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
         return J[:, 0]
 
-    def _fast(
+    def _find_evaluator(
         self,
         frame: str | Sequence[str] | None,
         reference: Reference | str,
@@ -1689,7 +1684,7 @@ _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
-def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
+def _merge_shared_items(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return a method's docstring, completed with the arguments and errors in `shared` and `errors`.
 
     The shape, the units and the equations of the result come from `QUANTITIES`.
@@ -1699,20 +1694,20 @@ def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, s
     own = {"Args": "", "Returns": "", "Raises": ""} | dict(zip(parts[::2], parts[1::2], strict=True))
     code, described = method.__code__, shared | dict(_ITEM.findall(own["Args"]))
     names = code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount]
-    own["Args"] = _indented([f"{name}: {described[name]}" for name in names])
+    own["Args"] = _indent_items([f"{name}: {described[name]}" for name in names])
     row = next((row for row in QUANTITIES.values() if row.method == method.__name__), None)
     if row is not None:
         shape, units = ", ".join(map(str, row.shape)), [f"{x} in {unit}" for x, unit in row.units.items()]
         result = "; ".join((f"(..., {shape}), or (..., frames, {shape}) for a list of frames", *units))
         source = f"Equation{'s' * (len(row.equations) > 1)} {', '.join(row.equations)}."
-        own["Returns"] = _indented([f"{own['Returns'] or f'{result}.'} {source}"])
+        own["Returns"] = _indent_items([f"{own['Returns'] or f'{result}.'} {source}"])
     raised = dict(_ITEM.findall(own["Raises"]))
-    own["Raises"] = _indented([f"{name}: {words}" for name, words in (raised | errors | raised).items()])
+    own["Raises"] = _indent_items([f"{name}: {words}" for name, words in (raised | errors | raised).items()])
     sections = (f"\n\n{title}:\n{section}" for title, section in own.items() if section)
     return "".join((text, *sections, start, example))
 
 
-def _indented(items: Sequence[str]) -> str:
+def _indent_items(items: Sequence[str]) -> str:
     lines = (" ".join(item.split()) for item in items)
     return "\n".join(fill(x, 98, initial_indent=4 * " ", subsequent_indent=8 * " ") for x in lines)
 
@@ -1722,7 +1717,7 @@ def _complete_docstrings() -> None:
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():
         if isinstance(method, FunctionType) and "threads" in method.__code__.co_varnames and method.__doc__:
-            method.__doc__ = _completed(method, *shared)
+            method.__doc__ = _merge_shared_items(method, *shared)
 
 
 _complete_docstrings()

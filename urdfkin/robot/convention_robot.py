@@ -76,8 +76,8 @@ class ConventionRobot:
 
     def certificate(self) -> Certificate:
         """Return the certificate of the robot's results."""
-        found: Certificate = self.robot.certificate()
-        return found
+        result: Certificate = self.robot.certificate()
+        return result
 
     def placement(self, q: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
         """Return T_world_frame (..., 4, 4); see `Robot.placement`."""
@@ -88,42 +88,44 @@ class ConventionRobot:
         return self._call(self.robot.relative_placement, (q,), frame, other, **options)[1]
 
     def velocity(
-        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
+        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return a frame's velocity (..., 6) with the target program's row order; see `Robot.velocity`."""
         return self.conversion.reorder_six_vector(
-            self._call(self.robot.velocity, (q, v), frame, *more, **options)[1]
+            self._call(self.robot.velocity, (q, v), frame, *arguments, **options)[1]
         )
 
     def acceleration(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return the target program's classical acceleration (..., 6); see `Robot.acceleration`."""
         return self.conversion.reorder_six_vector(
-            self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1]
+            self._call(self.robot.acceleration, (q, v, a), frame, *arguments, **options)[1]
         )
 
-    def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+    def jacobian(self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
         """Return the target program's Jacobian (..., 6, nv) of a frame; see `Robot.jacobian`."""
-        ours, J = self._call(self.robot.jacobian, (q,), frame, *more, **options)
+        ours, J = self._call(self.robot.jacobian, (q,), frame, *arguments, **options)
         return self.conversion.jacobian(ours[0], J)
 
     def jacobian_rate(
-        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
+        self, q: ArrayLike, v: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
     ) -> FloatArray:
         """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
-        ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *more, **options)
-        J = self.robot.jacobian(ours[0], frame, *more, **options)
+        ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *arguments, **options)
+        J = self.robot.jacobian(ours[0], frame, *arguments, **options)
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 
-    def hessian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+    def hessian(self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any) -> FloatArray:
         """Return the derivatives (..., 6, nv, nv) of the target program's Jacobian; see `Robot.hessian`."""
-        ours, H = self._call(self.robot.hessian, (q,), frame, *more, **options)
-        return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
+        ours, H = self._call(self.robot.hessian, (q,), frame, *arguments, **options)
+        return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *arguments, **options), H)
 
-    def analytical_jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+    def analytical_jacobian(
+        self, q: ArrayLike, frame: Any = None, *arguments: Any, **options: Any
+    ) -> FloatArray:
         """Return the target program's analytical Jacobian; see `Robot.analytical_jacobian`."""
-        ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *more, **options)
+        ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *arguments, **options)
         return self.conversion.columns(ours[0], J)
 
     def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
@@ -131,13 +133,13 @@ class ConventionRobot:
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(
-        self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
+        self, method: Callable[..., FloatArray], inputs: tuple[Any, ...], *arguments: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
         """Call a method of `Robot`; return the inputs in urdfkin's convention, and the result."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
-            for letter, x in zip("qva", given, strict=False)
+            for letter, x in zip("qva", inputs, strict=False)
         ]
-        found = self.conversion.from_(*read)
-        ours: tuple[FloatArray, ...] = found if isinstance(found, tuple) else (found,)
-        return ours, method(*ours, *more, **options)
+        result = self.conversion.from_(*read)
+        ours: tuple[FloatArray, ...] = result if isinstance(result, tuple) else (result,)
+        return ours, method(*ours, *arguments, **options)

@@ -35,12 +35,12 @@ class MotionCheck:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
             eps is the machine epsilon. scale is an upper bound on the sum of the absolute values of the terms
             of a number (`urdfkin.verify.bounds`).
-        share: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
+        bound_ratio: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
         bound: (n,) largest difference that rounding can cause, divided by the same eps * scale.
     """
 
     units: FloatArray
-    share: FloatArray
+    bound_ratio: FloatArray
     bound: FloatArray
 
 
@@ -56,10 +56,10 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         movable: (6, nv) booleans. False: this entry of the Jacobian is 0 in every configuration.
-        parts: Contributions to the acceleration, for each joint and each term of the equation.
+        breakdown: Contributions to the acceleration, for each joint and each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
-        not_verified: Reason why Pinocchio cannot check the robot; None if Pinocchio can.
+        unverified_reason: Reason why Pinocchio cannot check the robot; None if Pinocchio can.
 
     >>> import urdfkin
     >>> urdfkin.frame_motion(urdfkin.load("planar_two_link"), ([[0, 0]], [[1, 0]], [[0, 0]]), "tip")
@@ -73,13 +73,13 @@ class FrameMotion:
     acceleration: FloatArray
     jacobian: FloatArray
     movable: NDArray[np.bool_]
-    parts: AccelerationBreakdown
+    breakdown: AccelerationBreakdown
     checks: dict[str, MotionCheck]
-    not_verified: str | None
+    unverified_reason: str | None
 
     def __repr__(self) -> str:
         verdict = "verified by" if self.agrees else "DISAGREES with"
-        words = f"{verdict} Pinocchio" if self.not_verified is None else "not verified"
+        words = f"{verdict} Pinocchio" if self.unverified_reason is None else "not verified"
         return f"<FrameMotion of {self.frame}: {len(self.placement)} samples, {words}>"
 
     @property
@@ -90,7 +90,7 @@ class FrameMotion:
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
         True
         """
-        return all((check.share <= 1.0).all() for check in self.checks.values())
+        return all((check.bound_ratio <= 1.0).all() for check in self.checks.values())
 
     @property
     def singular_values(self) -> FloatArray:

@@ -16,7 +16,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str, safe_repr
 from urdfkin.model.tree import with_poses, with_tilts
 from urdfkin.robot import Robot
-from urdfkin.system.files import at_home, read_bytes
+from urdfkin.system.files import expand_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, find_axis_tilts
 from urdfkin.urdf.lint.rules.left_out import make_mjcf_findings
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
 #: Findings that help only the author of a URDF file. For a generated URDF, they cause no warning.
-_OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
+_FINDINGS_FOR_AUTHORS = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
 class LoadOptions(TypedDict):
@@ -94,8 +94,9 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
             root link is fixed.
         xacro_args: Arguments for a .xacro file, which needs the extra `xacro`.
         oracle: Oracle that checks quantities: "pinocchio", or "mujoco", which needs the extra `mujoco`.
-        lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.
-        joints: The joints that remain movable; see `Robot.locked`.
+        lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`. See
+            `Robot.with_locked_joints`.
+        joints: The joints that remain movable; see `Robot.with_locked_joints`.
         variant: Variant to select in each variant set of a USD stage, such as `{"Gripper": "Robotiq"}`.
         articulation: Path or name of the articulation, for a USD stage with several articulations.
 
@@ -121,7 +122,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
-    how: LoadOptions = {
+    options: LoadOptions = {
         "verify": verify,
         "mimic": mimic,
         "root_joint": root_joint,
@@ -134,11 +135,11 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
             "`variant` must be a mapping from variant sets to variants", found=safe_repr(variant)
         )
     if is_usd(source):
-        return _load_usd(source, xacro_args, variant, articulation, **how)
+        return _load_usd(source, xacro_args, variant, articulation, **options)
     if variant or articulation is not None:
         raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
     if is_urdf_path(source) or (isinstance(source, str) and find_entry(source)):
-        return robot_of(read_source(source, xacro_args=xacro_args), **how)
+        return make_robot(read_source(source, xacro_args=xacro_args), **options)
     from urdfkin.dh.parse_table import is_table_file
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
@@ -146,26 +147,30 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     from urdfkin.urdf.foreign import convert_to_urdf, find_lost_quaternions, is_pinocchio_model
     from urdfkin.urdf.mjcf import is_mjcf
 
-    if (found := find_description(source)) is not None:
-        source = found.path
-        xacro_args = {**found.xacro_args, **(xacro_args or {})}
+    if (description := find_description(source)) is not None:
+        source = description.path
+        xacro_args = {**description.xacro_args, **(xacro_args or {})}
     if isinstance(source, DHTable | ProductOfExponentials) or is_table_file(source):
-        return _load_table(source, xacro_args, **how)
+        return _load_table(source, xacro_args, **options)
     if is_mjcf(source):
-        return _load_mjcf(source, xacro_args, None, **how)
+        return _load_mjcf(source, xacro_args, None, **options)
     if is_pinocchio_model(source):
-        return _load_model(source, xacro_args, **how)
-    if (written := convert_to_urdf(source)) is not None:
-        _refuse_arguments(xacro_args, written[1])
-        lost = find_lost_quaternions(source, written[1])
-        robot = robot_of(UrdfText(written[0].encode(), written[1], written[1]), **how, listed=lost)
+        return _load_model(source, xacro_args, **options)
+    if (foreign := convert_to_urdf(source)) is not None:
+        _reject_xacro_args(xacro_args, foreign[1])
+        lost = find_lost_quaternions(source, foreign[1])
+        robot = make_robot(
+            UrdfText(foreign[0].encode(), foreign[1], foreign[1]), **options, source_findings=lost
+        )
         if lost:
             robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     streamed = source == "-" or hasattr(source, "read")
     return (
-        _load_mjcf(text.data, None, text, **how) if streamed and is_mjcf(text.data) else robot_of(text, **how)
+        _load_mjcf(text.data, None, text, **options)
+        if streamed and is_mjcf(text.data)
+        else make_robot(text, **options)
     )
 
 
@@ -177,32 +182,32 @@ def as_robot(source: Robot | Source | DHTable) -> Robot:
 def _load_table(
     source: DHTable | ProductOfExponentials | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
-    **how: Unpack[LoadOptions],
+    **options: Unpack[LoadOptions],
 ) -> Robot:
-    from urdfkin.dh.compare.hypotheses import table_warnings
+    from urdfkin.dh.compare.hypotheses import find_table_warnings
     from urdfkin.dh.convert import to_urdf
     from urdfkin.dh.parse_table import read_table_or_screws
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
     from urdfkin.verify.conversions import check_screws, check_table_source
 
-    _refuse_arguments(xacro_args, "a table")
+    _reject_xacro_args(xacro_args, "a table")
     table: DHTable | ProductOfExponentials
     if isinstance(source, DHTable | ProductOfExponentials):
         table, name = source, "<table>"
     else:
-        path = at_home(source)
+        path = expand_home(source)
         table, name = read_table_or_screws(path), unambiguous_path(path)
     if isinstance(table, ProductOfExponentials):
         urdf = write_urdf(table.to_tree())
     else:
         urdf = to_urdf(table)
-        for warning in table_warnings(table):
+        for warning in find_table_warnings(table):
             warnings.warn(f"{name}: {warning}", UrdfWarning, stacklevel=3)
     text = UrdfText(urdf.encode(), name, name)
-    robot = robot_of(text, **how, made=True, table=True)
-    if as_verify(how["verify"]):
-        verifier = _plain(robot, text).verifier
+    robot = make_robot(text, **options, is_generated=True, table=True)
+    if as_verify(options["verify"]):
+        verifier = _load_without_options(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
         else:
@@ -214,18 +219,18 @@ def _load_mjcf(
     source: str | bytes | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
     streamed: UrdfText | None,
-    **how: Unpack[LoadOptions],
+    **options: Unpack[LoadOptions],
 ) -> Robot:
     import hashlib
 
     from urdfkin.urdf.mjcf import source_name
     from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
 
-    _refuse_arguments(xacro_args, "MJCF")
-    wanted = bool(as_verify(how["verify"]))
-    data = _bytes_of_mjcf(source)
+    _reject_xacro_args(xacro_args, "MJCF")
+    checks = bool(as_verify(options["verify"]))
+    data = _read_mjcf_bytes(source)
     digest = hashlib.sha256(data).hexdigest()
-    read = read_mjcf(source, check=wanted)
+    read = read_mjcf(source, check=checks)
     name = (
         unambiguous_path(Path(read.path))
         if read.path
@@ -234,10 +239,12 @@ def _load_mjcf(
         else source_name(source)
     )
     text = UrdfText(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
-    listed = make_mjcf_findings(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
-    robot = robot_of(text, **how, listed=listed, made=True)
-    if wanted:
-        verifier = _plain(robot, text, listed=listed, made=True).verifier
+    source_findings = make_mjcf_findings(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
+    robot = make_robot(text, **options, source_findings=source_findings, is_generated=True)
+    if checks:
+        verifier = _load_without_options(
+            robot, text, source_findings=source_findings, is_generated=True
+        ).verifier
         robot.verifier.reading = check_mjcf_source(verifier, read)
     return robot
 
@@ -247,18 +254,18 @@ def _load_usd(
     xacro_args: Mapping[str, object] | None,
     variant: Mapping[str, str],
     articulation: str | None,
-    **how: Unpack[LoadOptions],
+    **options: Unpack[LoadOptions],
 ) -> Robot:
     import hashlib
 
     from urdfkin.urdf.lint.rules.left_out import make_usd_findings
     from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision
 
-    _refuse_arguments(xacro_args, "USD")
+    _reject_xacro_args(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
     if articulation is not None:
         as_str(articulation, "articulation")
-    wanted = bool(as_verify(how["verify"]))
+    checks = bool(as_verify(options["verify"]))
     read = read_usd(source, variants=variants, articulation=articulation)
     data = read_bytes(Path(read.path))
     digest = hashlib.sha256(data).hexdigest()
@@ -271,54 +278,56 @@ def _load_usd(
         variants=variants,
         articulation=articulation,
     )
-    verifier = robot_of(text, verify=False, made=True, quiet=True).verifier
+    verifier = make_robot(text, verify=False, is_generated=True, quiet=True).verifier
     line, remarks = check_usd_source(verifier, read)
-    listed = make_usd_findings((*read.remarks, *remarks), name, data)
-    robot = robot_of(text, **how, listed=listed, made=True)
+    source_findings = make_usd_findings((*read.remarks, *remarks), name, data)
+    robot = make_robot(text, **options, source_findings=source_findings, is_generated=True)
     robot.single = single_precision(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]
-    if wanted:
+    if checks:
         robot.verifier.reading = line
     return robot
 
 
-def _plain(robot: Robot, text: UrdfText, **options: Any) -> Robot:
+def _load_without_options(robot: Robot, text: UrdfText, **options: Any) -> Robot:
     """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
-    return robot if plain else robot_of(text, **options)
+    return robot if plain else make_robot(text, **options)
 
 
-def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
+def _read_mjcf_bytes(source: str | bytes | os.PathLike[str]) -> bytes:
     from urdfkin.urdf.mjcf import is_text
 
     if isinstance(source, bytes):
         return source
     if is_text(source):
         return str(source).encode("utf-8", "surrogatepass")
-    return read_bytes(at_home(source))
+    return read_bytes(expand_home(source))
 
 
-def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
+def _load_model(
+    source: Any, xacro_args: Mapping[str, object] | None, **options: Unpack[LoadOptions]
+) -> Robot:
     from urdfkin.urdf.foreign import convert_pinocchio_model
     from urdfkin.verify.conversions import check_model_source
 
-    _refuse_arguments(xacro_args, "a pinocchio.Model")
+    _reject_xacro_args(xacro_args, "a pinocchio.Model")
     read = convert_pinocchio_model(source)
     text = UrdfText(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
-    robot = robot_of(text, **how, made=True)
-    if as_verify(how["verify"]):
-        verifier = _plain(robot, text, made=True).verifier
+    robot = make_robot(text, **options, is_generated=True)
+    if as_verify(options["verify"]):
+        verifier = _load_without_options(robot, text, is_generated=True).verifier
         robot.verifier.reading = check_model_source(verifier, read, source)
     return robot
 
 
-def _refuse_arguments(xacro_args: Mapping[str, object] | None, found: str) -> None:
+def _reject_xacro_args(xacro_args: Mapping[str, object] | None, source_kind: str) -> None:
     if xacro_args:
-        raise InputError("`xacro_args` needs the path of a .xacro file", found=found)
+        raise InputError("`xacro_args` needs the path of a .xacro file", found=source_kind)
 
 
-def robot_of(
+def make_robot(
     text: UrdfText,
     *,
     verify: Verify = True,
@@ -327,16 +336,16 @@ def robot_of(
     oracle: OracleName = "pinocchio",
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
-    listed: tuple[Finding, ...] = (),
-    made: bool = False,
+    source_findings: tuple[Finding, ...] = (),
+    is_generated: bool = False,
     table: bool = False,
     quiet: bool = False,
 ) -> Robot:
     """Return the robot that a URDF text describes; the options `verify` to `joints` are those of `load`.
 
-    `made` states whether urdfkin generated the text from another source. `listed` contains findings about
-    that source. `table` states whether the source is a Denavit-Hartenberg table or a product of
-    exponentials. If `quiet` is True, no warnings are issued.
+    `is_generated` states whether urdfkin generated the text from another source. `source_findings` contains
+    findings about that source. `table` states whether the source is a Denavit-Hartenberg table or a product
+    of exponentials. If `quiet` is True, no warnings are issued.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
@@ -355,13 +364,15 @@ def robot_of(
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data)
     urdf = read_urdf(report, mimic=mimic, root_joint=root_joint)
-    findings = (*listed, *report.findings())
+    findings = (*source_findings, *report.findings())
     if urdf is None or report.has_errors:
         raise UrdfError(findings)
     if text.entry is None and not quiet:
         for finding in findings:
-            if finding.severity is Severity.WARNING and not (made and finding.code in _OF_A_TEXT):
-                warnings.warn(str(finding), UrdfWarning, stacklevel=4 if made else 3)
+            if finding.severity is Severity.WARNING and not (
+                is_generated and finding.code in _FINDINGS_FOR_AUTHORS
+            ):
+                warnings.warn(str(finding), UrdfWarning, stacklevel=4 if is_generated else 3)
     tree = read_tree(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := find_axis_tilts(urdf):
         tree = with_tilts(tree, tilted)
@@ -380,7 +391,7 @@ def robot_of(
         tip_frame=text.entry.tip if text.entry else None,
     )
     is_plain = isinstance(lock, str | Mapping) and not lock and joints is None
-    return robot if is_plain else robot.locked(lock, joints)
+    return robot if is_plain else robot.with_locked_joints(lock, joints)
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:

@@ -33,8 +33,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.errors.numbers import UNITS, in_radians, parse_float, parse_quantity, remedy
-from urdfkin.errors.validators import real_number, whole_number
+from urdfkin.errors.numbers import UNITS, number_remedy, parse_float, parse_quantity, radians_from_degrees
+from urdfkin.errors.validators import as_finite_float, as_int
 from urdfkin.kinematics.inputs import FloatArray, as_finite
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_from_quaternion
 from urdfkin.model.base_motion import BaseMotion
@@ -42,7 +42,7 @@ from urdfkin.model.configuration import coordinate_layout, parse_finite
 from urdfkin.model.configuration_like import ConfigurationLike, join_names, wrong_count_error
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, freeze
-from urdfkin.system.files import MOST_DATA, read_bytes, read_text
+from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_text
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
@@ -63,14 +63,14 @@ def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str
         InputError: an array is unknown, missing, of a wrong shape or not finite.
     """
     try:
-        with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(read_bytes(path, MAX_DATA_BYTES, pipes=True)), allow_pickle=False) as archive:
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("a single array")
             _check_names(path, archive.files, shapes, required)
             entries = archive.zip.infolist() if archive.zip else []
             size = sum(entry.file_size for entry in entries)
-            if size > MOST_DATA:
-                raise ValueError(f"arrays of {size} bytes, more than {MOST_DATA}")
+            if size > MAX_DATA_BYTES:
+                raise ValueError(f"arrays of {size} bytes, more than {MAX_DATA_BYTES}")
             given = {name: archive[name] for name in archive.files}
     except (
         ValueError,
@@ -114,7 +114,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 
 #: Minimum number of samples; a second difference needs three.
-_FEWEST = 3
+_MIN_SAMPLES = 3
 #: Arrays of an .npz file with the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: The user gets a note if the rounding error of times exceeds this fraction of the smallest time step.
@@ -142,7 +142,7 @@ class Trajectory:
         q: (n, nq) configurations, rad and m.
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
-        rates: How v and a were obtained, such as "by central differences".
+        rates_source: How v and a were obtained, such as "by central differences".
         exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a are
             approximate, or come from a file; see `errors`.
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
@@ -151,7 +151,7 @@ class Trajectory:
             if there are too few samples.
 
     >>> import urdfkin
-    >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
+    >>> make_line_trajectory(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
     <Trajectory: 101 samples in 2 s, rates of the line>
     """
 
@@ -159,32 +159,33 @@ class Trajectory:
     q: FloatArray
     v: FloatArray
     a: FloatArray
-    rates: str
+    rates_source: str
     exact: bool = False
     notes: tuple[str, ...] = ()
     base: BaseMotion | None = None
     errors: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
-        return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
+        duration = self.t[-1] - self.t[0]
+        return f"<Trajectory: {len(self.t)} samples in {duration:.4g} s, rates {self.rates_source}>"
 
     def derivation(self) -> str:
         """Return one line that states how v and a were obtained, and their estimated errors.
 
         >>> import urdfkin
-        >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
+        >>> make_line_trajectory(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
         'of the line'
         """
         if self.errors is None:
-            return self.rates
+            return self.rates_source
         v, a = self.errors
         return (
-            f"{self.rates}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or m/s^2 (a),"
-            " estimated by a second computation with every second sample"
+            f"{self.rates_source}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or"
+            " m/s^2 (a), estimated by a second computation with every second sample"
         )
 
 
-def line(
+def make_line_trajectory(
     robot: Robot, start: ConfigurationLike, end: ConfigurationLike, duration: float, samples: int
 ) -> Trajectory:
     """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
@@ -193,11 +194,11 @@ def line(
     continuous joint moves by `end - start`, even by more than one turn. `duration` is in seconds, and
     `samples` counts both ends.
     """
-    duration = real_number(duration, "the duration")
-    samples = whole_number(samples, "samples", 0)
-    if duration <= 0.0 or samples < _FEWEST:
+    duration = as_finite_float(duration, "the duration")
+    samples = as_int(samples, "samples", 0)
+    if duration <= 0.0 or samples < _MIN_SAMPLES:
         raise InputError(
-            f"a line needs a duration above 0 and at least {_FEWEST} samples",
+            f"a line needs a duration above 0 and at least {_MIN_SAMPLES} samples",
             found=f"{duration} s, {samples}",
         )
     q_0, q_1 = parse_finite(robot.tree, start, "q"), parse_finite(robot.tree, end, "q")
@@ -233,7 +234,7 @@ def read_trajectory(
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
     Without t, the samples are one second apart. If the file has no a, or neither v nor a, central differences
     replace the missing arrays. Before v is computed, the angles of continuous, planar and floating joints are
-    unwrapped. The attributes `rates`, `errors` and `notes` of the result report these computations.
+    unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report these computations.
 
     Args:
         robot: The robot.
@@ -254,17 +255,17 @@ def read_trajectory(
     ...     log = Path(folder, "log.csv")
     ...     _ = log.write_text("time,joint_1 [deg],joint_2\n0,0,1\n0.1,9,1\n0.2,18,1\n")
     ...     motion = urdfkin.read_trajectory(arm, log)
-    >>> motion.q[2].round(4).tolist(), motion.v[1].round(4).tolist(), motion.rates
+    >>> motion.q[2].round(4).tolist(), motion.v[1].round(4).tolist(), motion.rates_source
     ([0.3142, 1.0], [1.5708, 0.0], 'by central differences')
     """
     conversion = None if convention is None else robot.convention(convention)
-    return with_rates(robot.tree, read_samples(robot, Path(path), conversion))
+    return complete_rates(robot.tree, read_samples(robot, Path(path), conversion))
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
     """Read the samples of a file like `read_trajectory`, but without computing missing velocities."""
     archive = path.suffix.lower() == ".npz"
-    data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
+    data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
     if a is not None and v is None:
         raise InputError("joint accelerations need joint velocities", where=str(path), found="a without v")
@@ -288,39 +289,39 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
     return TrajectorySamples(str(path), freeze(q), t, v, a, base)
 
 
-def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
+def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     """Return a trajectory, with central differences for missing arrays v and a."""
     n = len(x.q)
-    if n < _FEWEST:
-        raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=x.where, found=str(n))
+    if n < _MIN_SAMPLES:
+        raise InputError(f"a trajectory needs at least {_MIN_SAMPLES} samples", where=x.where, found=str(n))
     t = np.arange(n, dtype=np.float64) if x.t is None else x.t
     if x.v is not None and x.a is not None:
         return Trajectory(freeze(t), x.q, x.v, x.a, "as given", base=x.base)
-    found = Unwrapped(x.q, (), ()) if x.v is not None else unwrapped(tree, x.q)
-    v, a = _differences(tree, found.q, t, x.v)
+    found = UnwrappedSamples(x.q, (), ()) if x.v is not None else unwrap_angles(tree, x.q)
+    v, a = _central_differences(tree, found.q, t, x.v)
     errors = None
-    if n >= 2 * _FEWEST - 1:
+    if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
-        coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
+        coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
         # With the time step h, the error of a is proportional to h^order.
         order = 1 if x.v is None else 2
-        errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
+        errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, and a by central differences of this v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
-    notes = (*found.notes, *_time_notes(t, given=x.t is not None))
+    notes = (*found.notes, *_time_notes(t, has_times=x.t is not None))
     rows = freeze(t), freeze(found.q), freeze(v), freeze(a)
     return Trajectory(*rows, words, notes=notes, base=x.base, errors=errors)
 
 
-def _differences(
+def _central_differences(
     tree: KinematicTree, q: FloatArray, t: FloatArray, v: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    v = _rates(tree, q, t) if v is None else v
-    return v, _gradient(v, t)
+    v = _central_velocities(tree, q, t) if v is None else v
+    return v, _differentiate(v, t)
 
 
-def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
+def _estimate_error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
     """Estimate the largest error of `fine`; `coarse` has twice the time step.
 
     The error of `coarse` is larger than the error of `fine` by the factor 2^`order`.
@@ -328,8 +329,8 @@ def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
-def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
-    if not given:
+def _time_notes(t: FloatArray, *, has_times: bool) -> Iterator[str]:
+    if not has_times:
         yield "there are no times: the samples are assumed to be one second apart"
         return
     step, rounding = float(np.diff(t).min()), float(np.spacing(np.abs(t).max()))
@@ -340,7 +341,7 @@ def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
         )
 
 
-def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str, FloatArray]:
+def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str, FloatArray]:
     names: dict[str, list[str]] = {}
     units = {"t": "s"}
     for x, prefix in (("q", ""), ("v", "v:"), ("a", "a:")):
@@ -353,8 +354,8 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
         if conversion is None
         else f"a trajectory in the convention {conversion.convention.name}"
     )
-    text = read_text(path, MOST_DATA, pipes=True)
-    data = read_columns(text, str(path), what, names["q"], optional, named=True, units=units)
+    text = read_text(path, MAX_DATA_BYTES, pipes=True)
+    data = read_columns(text, str(path), what, names["q"], optional, requires_header=True, units=units)
     found = {x: _columns(path, data, names[x]) for x in "qva" if x == "q" or any(n in data for n in names[x])}
     return found | ({"t": data["t"]} if "t" in data else {})
 
@@ -368,7 +369,7 @@ def column_units(robot: Robot, letter: str, conversion: Conversion | None = None
     }
 
 
-def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
+def _read_npz(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
     shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
@@ -379,12 +380,12 @@ def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
     return data
 
 
-def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
+def _central_velocities(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
     """Return joint velocities (n, nv), computed by central differences.
 
     The velocity of a planar or floating joint is in the axes of the moving frame.
     """
-    slopes = _gradient(q, t)
+    slopes = _differentiate(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
         if joint.nv == 1:
@@ -412,7 +413,7 @@ def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -
     return np.stack([data[name] for name in names], axis=-1) if names else np.empty((n, 0))
 
 
-def _gradient(x: FloatArray, t: FloatArray) -> FloatArray:
+def _differentiate(x: FloatArray, t: FloatArray) -> FloatArray:
     return np.gradient(x, t, axis=0, edge_order=2)
 
 
@@ -423,15 +424,15 @@ def read_columns(
     required: Sequence[str],
     optional: Sequence[str] = (),
     *,
-    named: bool = False,
+    requires_header: bool = False,
     units: Mapping[str, str] | None = None,
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
     Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. If `named` is True, this line must contain the names. If no line
-    contains names, the columns are those in `required`, in this order. A heading may end with a unit, such as
-    `elbow [deg]`. `units` contains the SI unit of each column that may have a unit.
+    names of the columns, in any order. If `requires_header` is True, this line must contain the names. If no
+    line contains names, the columns are those in `required`, in this order. A heading may end with a unit,
+    such as `elbow [deg]`. `units` contains the SI unit of each column that may have a unit.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -439,11 +440,15 @@ def read_columns(
     rows = _rows(text, where)
     names, written = list(required), list[str]()
     first = next(rows, None)
-    if first is not None and (named or _is_header(first[1], names)):
+    if first is not None and (requires_header or _is_header(first[1], names)):
         line, cells = first
-        headings = [_heading(cell, f"{where}:{line}", units or {}) for cell in cells]
+        headings = [_parse_heading(cell, f"{where}:{line}", units or {}) for cell in cells]
         names, written = [name for name, _ in headings], [unit for _, unit in headings]
-        if named and not {*names} & {*required, *optional} and all(parse_float(x) is not None for x in cells):
+        if (
+            requires_header
+            and not {*names} & {*required, *optional}
+            and all(parse_float(x) is not None for x in cells)
+        ):
             raise InputError(
                 f"no header: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
@@ -453,11 +458,11 @@ def read_columns(
         _check_columns(names, cells, f"{where}:{line}", what, required, optional)
     elif first is not None:
         rows = chain([first], rows)
-    values = chain.from_iterable(numbers(cells, f"{where}:{line}", names) for line, cells in rows)
+    values = chain.from_iterable(parse_numbers(cells, f"{where}:{line}", names) for line, cells in rows)
     table = np.fromiter(values, np.float64).reshape(-1, max(1, len(names)))
     found = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
     return found | {
-        name: _in_si(found[name], unit) for name, unit in zip(names, written, strict=False) if unit
+        name: _convert_to_si(found[name], unit) for name, unit in zip(names, written, strict=False) if unit
     }
 
 
@@ -474,11 +479,11 @@ _SUFFIXES = (
 )
 
 
-def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column that a heading names, and the unit in the heading, as `_unit` does.
+def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
+    """Return the column that a heading names, and the unit in the heading, as `_parse_unit` does.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
-    >>> [_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
+    >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
     [('t', 'ms'), ('elbow', 'deg'), ('v:elbow', 'deg'), ('wrist', '')]
     """
     if (name := _column_name(cell, units)) in units:
@@ -491,7 +496,7 @@ def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]
     found += [(match[1], "/".join(match.groups()[1:])) for match in matches if match]
     for heading, unit in found:
         if (name := _column_name(heading, units)) in units:
-            return name, _unit(unit, f"{where}, {cell}", units[name])
+            return name, _parse_unit(unit, f"{where}, {cell}", units[name])
     return cell, ""
 
 
@@ -504,7 +509,7 @@ def _column_name(heading: str, units: Mapping[str, str]) -> str:
     return heading
 
 
-def _unit(text: str, where: str, expected: str) -> str:
+def _parse_unit(text: str, where: str, expected: str) -> str:
     """Return the short name of the unit `text`: "ms", "deg" also for "deg/s", "" for an SI unit."""
     if expected == "s":
         if (factor := _PER_SECOND.get(text.strip().lower())) is None:
@@ -521,19 +526,19 @@ def _unit(text: str, where: str, expected: str) -> str:
     return "" if UNITS[word] == kind else UNITS[word]
 
 
-def _in_si(column: FloatArray, unit: str) -> FloatArray:
+def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # For k * 15 degrees, `in_radians` returns exactly k * pi / 12.
-        return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
+        # For k * 15 degrees, `radians_from_degrees` returns exactly k * pi / 12.
+        return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
-def width_of(text: str, where: str) -> int:
+def count_cells(text: str, where: str) -> int:
     """Return the number of cells in the first line that `_rows` does not skip, or 0 without such a line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
-def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
+def parse_numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
     """Parse one number for each name."""
     if len(cells) != len(names):
         raise wrong_count_error(names, len(cells), where)
@@ -541,7 +546,10 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
     for name, cell in zip(names, cells, strict=True):
         if (value := parse_float(cell)) is None:
             raise InputError(
-                "not a finite number", where=f"{where}, {name}", found=repr(cell.strip()), remedy=remedy(cell)
+                "not a finite number",
+                where=f"{where}, {name}",
+                found=repr(cell.strip()),
+                remedy=number_remedy(cell),
             )
         values.append(value)
     return values
@@ -591,21 +599,21 @@ def _check_columns(
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
 #: The rotation in the opposite direction leads to the same pose, and is less than twice as large.
-_AMBIGUOUS = math.tau / 3.0
+_MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.
 #: For a multiplier m with |m| > 1, the limit is |m| times this value.
-_ROUNDING = 1e-9
+_MIMIC_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Unwrapped:
+class UnwrappedSamples:
     q: FloatArray
     joints: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
+def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
     Between two samples, a joint is assumed to turn in the shorter direction. If the angles of a joint span
@@ -621,26 +629,26 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
         if not np.array_equal(new[:, own], q[:, own]):
             changed.append(joint.name)
             notes.append(_unwrap_note(joint, q[:, own], new[:, own]))
-    return Unwrapped(new, tuple(changed), (*notes, *_mimic_notes(tree, q, new)))
+    return UnwrappedSamples(new, tuple(changed), (*notes, *_mimic_notes(tree, q, new)))
 
 
-def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
+def _unwrap_joint_angle(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
     """Unwrap the angle of a continuous or planar joint; the angle is the joint's last coordinate."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)
     if within_one_turn:
-        new[:, -1] = _without_jumps(angle)
+        new[:, -1] = _remove_jumps(angle)
     step = np.abs(np.diff(new[:, -1]))
-    if step.max(initial=0.0) > _AMBIGUOUS:
+    if step.max(initial=0.0) > _MAX_CLEAR_ROTATION:
         notes.append(_ambiguity_note(joint, step, wrapped=within_one_turn))
     return new, notes
 
 
-def _without_jumps(angle: FloatArray) -> FloatArray:
+def _remove_jumps(angle: FloatArray) -> FloatArray:
     """Add whole turns after each step of more than half a turn.
 
-    >>> _without_jumps(np.array([3.0, -3.0, -2.5])).round(4).tolist()
+    >>> _remove_jumps(np.array([3.0, -3.0, -2.5])).round(4).tolist()
     [3.0, 3.2832, 3.7832]
     """
     step = np.diff(angle)
@@ -648,13 +656,15 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
     return angle + math.tau * np.concatenate(([0.0], np.cumsum(turns)))
 
 
-def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
+def _align_quaternion_signs(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
     """Choose the signs of quaternions so that consecutive quaternions are close."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]
     step = 2.0 * np.arccos(np.minimum(1.0, np.abs(along)))
-    return new, [_ambiguity_note(joint, step, wrapped=True)] if step.max(initial=0.0) > _AMBIGUOUS else []
+    return new, [_ambiguity_note(joint, step, wrapped=True)] if step.max(
+        initial=0.0
+    ) > _MAX_CLEAR_ROTATION else []
 
 
 def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
@@ -669,11 +679,15 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     )
 
 
-_UNWRAP = {JointKind.CONTINUOUS: _turning, JointKind.PLANAR: _turning, JointKind.FLOATING: _floating}
+_UNWRAP = {
+    JointKind.CONTINUOUS: _unwrap_joint_angle,
+    JointKind.PLANAR: _unwrap_joint_angle,
+    JointKind.FLOATING: _align_quaternion_signs,
+}
 
 
 def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
-    k, count = int(step.argmax()), int((step > _AMBIGUOUS).sum())
+    k, count = int(step.argmax()), int((step > _MAX_CLEAR_ROTATION).sum())
     more = f", and in {count - 1} more steps" if count > 1 else ""
     assumption = (
         "the shorter direction is assumed, which may be wrong"
@@ -695,8 +709,8 @@ def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterato
         moved = rule.multiplier * (new[:, at] - q[:, at])
         if joint.kind.turns:
             moved = np.remainder(moved + math.pi, math.tau) - math.pi
-        if np.abs(moved).max() > _ROUNDING * max(1.0, abs(rule.multiplier)):
-            k = int(np.flatnonzero(np.abs(moved) > _ROUNDING)[0])
+        if np.abs(moved).max() > _MIMIC_ROUNDING * max(1.0, abs(rule.multiplier)):
+            k = int(np.flatnonzero(np.abs(moved) > _MIMIC_ROUNDING)[0])
             yield (
                 f"joint {joint.name} mimics {rule.leader} with multiplier {rule.multiplier:g}; unwrapping"
                 f" {rule.leader} changes the value of {joint.name}, at sample {k} from"

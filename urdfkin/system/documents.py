@@ -17,12 +17,12 @@ import msgspec
 from msgspec import Meta
 
 from urdfkin.errors import InputError
-from urdfkin.system.files import MOST_DATA, read_bytes
+from urdfkin.system.files import MAX_DATA_BYTES, read_bytes
 
 _T = TypeVar("_T")
 
 
-def says(text: str) -> Meta:
+def doc(text: str) -> Meta:
     return Meta(description=text)
 
 
@@ -35,7 +35,7 @@ Size = Annotated[float, Meta(ge=0)]
 Matrix = Annotated[
     list[Annotated[list[float], of_length(4)]],
     of_length(4),
-    says("Homogeneous transform (4, 4) as a list of rows, with the translation in metres."),
+    doc("Homogeneous transform (4, 4) as a list of rows, with the translation in metres."),
 ]
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
@@ -43,21 +43,21 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 class Header(TypedDict):
     """The first entries of every certificate and report."""
 
-    schema: Annotated[str, says("Name and version of the layout of this document.")]
+    schema: Annotated[str, doc("Name and version of the layout of this document.")]
     versions: Annotated[
-        dict[str, str], says("Version of each package: urdfkin, its libraries and the oracles.")
+        dict[str, str], doc("Version of each package: urdfkin, its libraries and the oracles.")
     ]
     sha256: Annotated[
         list[Sha256 | None],
-        says(
+        doc(
             "One SHA-256 digest for each robot, in the order of the robots: of the URDF's text as UTF-8, or "
             "of the MJCF or USD file. null means that the digest is unknown."
         ),
     ]
-    verdict: Annotated[str, says("Verdict of the document as a whole.")]
+    verdict: Annotated[str, doc("Verdict of the document as a whole.")]
     command: Annotated[
         str | None,
-        says(
+        doc(
             "Command that makes the document again, or null if it is unknown. The robots in a line have the "
             "same options. At most one robot in a line was given as text (`-`: standard input)."
         ),
@@ -70,14 +70,14 @@ class DocumentKind(Generic[_T]):
 
     Attributes:
         verdicts: The possible verdicts; empty if the document has no header.
-        made_by: Command that writes documents of this kind.
+        command: Command that writes documents of this kind.
         is_open: Whether a document may have unknown entries, for example of a later version of urdfkin.
     """
 
     name: str
     type: type[_T]
     verdicts: tuple[str, ...]
-    made_by: str
+    command: str
     is_open: bool = False
 
     def schema(self) -> dict[str, Any]:
@@ -102,22 +102,22 @@ class DocumentKind(Generic[_T]):
         return json.dumps(self.schema(), indent=2) + "\n"
 
     def read(self, path: Path) -> _T:
-        return self.checked(read_json(path), str(path))
+        return self.validate(read_json(path), str(path))
 
-    def checked(self, data: object, where: str) -> _T:
-        self._demand_name(data, where)
+    def validate(self, data: object, where: str) -> _T:
+        self._check_schema_name(data, where)
         try:
-            document = typed(data, self.type)
+            document = from_data(data, self.type)
         except ValueError as error:
             claim, _, place = str(error).partition(" - at ")
-            raise self._refusal(where, place.strip("`") or "$", claim) from None
+            raise self._layout_error(where, place.strip("`") or "$", claim) from None
         if not self.is_open and (entry := _unknown_entry(data, document)) is not None:
-            raise self._refusal(where, *entry)
+            raise self._layout_error(where, *entry)
         if self.verdicts and (verdict := cast("Header", document)["verdict"]) not in self.verdicts:
-            raise self._refusal(where, "$.verdict", f"{verdict!r} is none of {', '.join(self.verdicts)}")
+            raise self._layout_error(where, "$.verdict", f"{verdict!r} is none of {', '.join(self.verdicts)}")
         return document
 
-    def _demand_name(self, data: object, where: str) -> None:
+    def _check_schema_name(self, data: object, where: str) -> None:
         found = data.get("schema") if isinstance(data, dict) else None
         if found == self.name:
             return
@@ -127,21 +127,21 @@ class DocumentKind(Generic[_T]):
                 f"unknown version of the layout {family}",
                 where=where,
                 found=repr(found),
-                remedy=f"this urdfkin reads version {version}: write the file again with: {self.made_by}",
+                remedy=f"this urdfkin reads version {version}: write the file again with: {self.command}",
             )
         raise InputError(
             f"not a file with the layout {self.name}",
             where=where,
             found=repr(found) if found else "no 'schema' entry",
-            remedy=f"write one with: {self.made_by}",
+            remedy=f"write one with: {self.command}",
         )
 
-    def _refusal(self, where: str, place: str, claim: str) -> InputError:
+    def _layout_error(self, where: str, place: str, claim: str) -> InputError:
         return InputError(
             f"does not conform to the layout {self.name}",
             where=where,
             found=f"{place}: {claim}",
-            remedy=f"write it again with: {self.made_by}",
+            remedy=f"write it again with: {self.command}",
         )
 
 
@@ -159,38 +159,38 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, strings and numbers; `typed` converts the data back.
+    """Convert a result to dicts, lists, strings and numbers; `from_data` converts the data back.
 
     Infinity and NaN stay numbers.
     """
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 
-def typed(data: object, type_: type[_T]) -> _T:
+def from_data(data: object, type_: type[_T]) -> _T:
     try:
         return msgspec.convert(data, type_)
     except msgspec.ValidationError as error:
         raise ValueError(str(error)) from error
 
 
-def plain(value: Any) -> Any:
+def as_json_data(value: Any) -> Any:
     """Convert a result to data for JSON; infinity and NaN become None."""
     return json.loads(json.dumps(as_data(value)), parse_constant=lambda _: None)
 
 
 def read_json(path: Path) -> object:
-    return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
+    return parse_json(read_bytes(path, MAX_DATA_BYTES, pipes=True), str(path))
 
 
 def parse_json(content: bytes, where: str) -> object:
     """Parse JSON; raise InputError for invalid JSON, or for a number beyond the range of doubles."""
     try:
-        return json.loads(content, parse_constant=_number, parse_float=_number)
+        return json.loads(content, parse_constant=_parse_finite, parse_float=_parse_finite)
     except (ValueError, RecursionError) as error:
         raise InputError("not a JSON file", where=where, found=str(error)) from error
 
 
-def _number(word: str) -> float:
+def _parse_finite(word: str) -> float:
     number = float(word)
     if not math.isfinite(number):
         raise ValueError(f"{word[:20]} is not a finite number")

@@ -29,10 +29,10 @@ class Edit:
     text: str = ""
 
 
-def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
+def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     """Return the data with all edits applied; raise InputError if two edits overlap.
 
-    >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
+    >>> apply_edits(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
     b'a=10 b=3'
     """
     parts, cursor = list[bytes](), 0
@@ -45,26 +45,26 @@ def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
 
 
 #: Maximum time to wait for a process that opens the other end of a named pipe, s.
-PATIENCE = 10.0
+PIPE_TIMEOUT = 10.0
 #: Maximum size of a robot, a table, a settings file or a cached file, bytes.
-MOST = 100_000_000
+MAX_BYTES = 100_000_000
 #: Maximum size of data (trajectories, samples, reports), bytes.
-MOST_DATA = 2_000_000_000
-_AT_A_TIME = 2**20
-_KINDS = {
+MAX_DATA_BYTES = 2_000_000_000
+_CHUNK_BYTES = 2**20
+_FILE_TYPES = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a character device",
     stat.S_IFBLK: "a block device",
 }  # fmt: skip
 
 
-def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
-    """Return the content of a file of at most `most` bytes, or raise SourceError.
+def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -> bytes:
+    """Return the content of a file of at most `max_bytes` bytes, or raise SourceError.
 
     With `pipes`, the function also reads pipes and devices. Use `pipes` only for paths that the user named.
     """
-    data = read_start(path, most + 1, pipes=pipes)
-    if len(data) > most:
-        raise _too_large(shortened(path), most)
+    data = read_start(path, max_bytes + 1, pipes=pipes)
+    if len(data) > max_bytes:
+        raise _too_large(shorten_path(path), max_bytes)
     return data
 
 
@@ -78,10 +78,10 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             if stat.S_ISDIR(kind):
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             if not pipes:
-                _check_regular(path, kind)
-            first = _first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
+                _require_regular(path, kind)
+            first = _read_first_of_pipe(descriptor, path) if stat.S_ISFIFO(kind) else b""
             os.set_blocking(descriptor, True)
-            return _read_up_to(count, descriptor, first)
+            return _read_at_most(count, descriptor, first)
         finally:
             os.close(descriptor)
     except SourceError:
@@ -89,50 +89,50 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     # A null character in the name raises ValueError.
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SourceError("cannot be read", where=shortened(path), found=reason) from error
+        raise SourceError("cannot be read", where=shorten_path(path), found=reason) from error
 
 
-def demand_regular(path: Path) -> None:
+def require_regular_file(path: Path) -> None:
     """Raise SourceError for a pipe, a socket or a device, but not for a path that does not exist."""
     try:
         kind = path.stat().st_mode
     except (OSError, ValueError):
         return
-    _check_regular(path, kind)
+    _require_regular(path, kind)
 
 
-def _check_regular(path: Path, kind: int) -> None:
+def _require_regular(path: Path, kind: int) -> None:
     if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
         raise SourceError(
             "not a regular file",
-            where=shortened(path),
-            found=_KINDS.get(stat.S_IFMT(kind), "another kind"),
+            where=shorten_path(path),
+            found=_FILE_TYPES.get(stat.S_IFMT(kind), "another kind"),
             remedy="put a regular file in its place",
         )
 
 
-def read_if_there(path: Path, most: int = MOST) -> bytes | None:
+def read_if_exists(path: Path, max_bytes: int = MAX_BYTES) -> bytes | None:
     try:
-        return read_bytes(path, most)
+        return read_bytes(path, max_bytes)
     except SourceError as error:
         if isinstance(error.__cause__, FileNotFoundError):
             return None
         raise
 
 
-def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
+def read_text(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -> str:
     try:
-        return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
+        return read_bytes(path, max_bytes, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SourceError(
             "cannot be read", where=str(path), found=f"text that is not UTF-8 ({error})"
         ) from None
 
 
-def read_standard_input(most: int = MOST) -> bytes:
-    data = read_start_of_standard_input(most + 1)
-    if len(data) > most:
-        raise _too_large("standard input", most)
+def read_standard_input(max_bytes: int = MAX_BYTES) -> bytes:
+    data = read_start_of_standard_input(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise _too_large("standard input", max_bytes)
     return data
 
 
@@ -163,48 +163,48 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def at_home(name: str | os.PathLike[str]) -> Path:
+def expand_home(name: str | os.PathLike[str]) -> Path:
     try:
         return Path(name).expanduser()
     except RuntimeError:
         return Path(name)
 
 
-def shortened(path: Path) -> str:
+def shorten_path(path: Path) -> str:
     """Return a path for a message; a path of more than 300 characters is abbreviated.
 
-    >>> len(shortened(Path("x" * 5000))) < 200
+    >>> len(shorten_path(Path("x" * 5000))) < 200
     True
     """
     text = str(path)
     return text if len(text) <= 300 else f"{text[:60]}...{text[-60:]} ({len(text)} characters)"
 
 
-def _too_large(where: str, most: int) -> SourceError:
+def _too_large(where: str, max_bytes: int) -> SourceError:
     return SourceError(
         "too large",
         where=where,
-        found=f"more than {most} bytes",
+        found=f"more than {max_bytes} bytes",
         remedy="split the file, or remove the parts that are not needed",
     )
 
 
-def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
-    pieces, left = [first[:count]], count - len(first)
-    while left > 0 and (piece := os.read(descriptor, min(left, _AT_A_TIME))):
+def _read_at_most(count: int, descriptor: int, first: bytes) -> bytes:
+    pieces, remaining = [first[:count]], count - len(first)
+    while remaining > 0 and (piece := os.read(descriptor, min(remaining, _CHUNK_BYTES))):
         pieces.append(piece)
-        left -= len(piece)
+        remaining -= len(piece)
     return b"".join(pieces)
 
 
-def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return available bytes of a pipe; raise SourceError if no writer connects within `PATIENCE` seconds."""
+def _read_first_of_pipe(descriptor: int, path: Path) -> bytes:
+    """Return available bytes of a pipe; raise SourceError if no writer connects within `PIPE_TIMEOUT` s."""
     events = select.poll()
     events.register(descriptor, select.POLLIN)
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + PIPE_TIMEOUT
     while time.monotonic() < end:
         try:
-            if piece := os.read(descriptor, _AT_A_TIME):
+            if piece := os.read(descriptor, _CHUNK_BYTES):
                 return piece
         # A writer is connected, but has written nothing yet.
         except BlockingIOError:
@@ -216,7 +216,7 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
     raise SourceError(
         "a pipe without a writer",
         where=str(path),
-        found=f"nothing in {PATIENCE:g} s",
+        found=f"nothing in {PIPE_TIMEOUT:g} s",
         remedy="write the text into a file, or pass it on standard input with -",
     )
 

@@ -13,53 +13,53 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors import SourceError
-from urdfkin.system.files import MOST, read_bytes
+from urdfkin.system.files import MAX_BYTES, read_bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Version:
+class CommitFiles:
     """The files of one commit of a git repository.
 
     Attributes:
         files: Git's digest of the content of each file. The key is the path of the file relative to `root`.
-        gone: Base names of the files of the commit that do not exist in the working tree.
+        missing_names: Base names of the files of the commit that do not exist in the working tree.
     """
 
     root: Path
     files: dict[str, str]
     digests: frozenset[str]
-    gone: frozenset[str]
+    missing_names: frozenset[str]
 
-    def name(self, path: Path) -> str:
+    def relative_name(self, path: Path) -> str:
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
-    def holds(self, data: bytes) -> bool:
+    def contains(self, data: bytes) -> bool:
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests
             for kind in ("sha1", "sha256")
         )
 
-    def changed(self, endings: tuple[str, ...]) -> bool:
-        names = (name for name in self.files if name.endswith(endings))
+    def has_changes(self, suffixes: tuple[str, ...]) -> bool:
+        names = (name for name in self.files if name.endswith(suffixes))
         return not all(
-            (self.root / name).is_file() and self.holds(read_bytes(self.root / name)) for name in names
+            (self.root / name).is_file() and self.contains(read_bytes(self.root / name)) for name in names
         )
 
-    def read(self, path: Path) -> bytes | None:
-        if (digest := self.files.get(self.name(path))) is None:
+    def read_file(self, path: Path) -> bytes | None:
+        if (digest := self.files.get(self.relative_name(path))) is None:
             return None
-        if int(size := _text("cat-file", "-s", digest, cwd=self.root)) > MOST:
+        if int(size := _text("cat-file", "-s", digest, cwd=self.root)) > MAX_BYTES:
             raise SourceError(
                 "too large in the older version",
                 where=str(path),
-                found=f"{size} bytes, more than {MOST}",
+                found=f"{size} bytes, more than {MAX_BYTES}",
                 remedy="leave out --changed-since",
             )
         return _git("cat-file", "blob", digest, cwd=self.root)
 
 
-def version_before(reference: str, folder: Path) -> Version:
+def merge_base_files(reference: str, folder: Path) -> CommitFiles:
     """Return the merge base of HEAD and a branch, tag or commit, or raise SourceError."""
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:
@@ -78,8 +78,8 @@ def version_before(reference: str, folder: Path) -> Version:
     rows = _git("ls-tree", "-r", "-z", "--full-tree", merge_base, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)
     files = {os.fsdecode(name): head.split()[2].decode() for head, _, name in parts}
-    gone = frozenset(Path(name).name for name in files if not (root / name).exists())
-    return Version(root, files, frozenset(files.values()), gone)
+    missing_names = frozenset(Path(name).name for name in files if not (root / name).exists())
+    return CommitFiles(root, files, frozenset(files.values()), missing_names)
 
 
 def _text(*words: str, cwd: Path) -> str:

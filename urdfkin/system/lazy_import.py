@@ -14,26 +14,26 @@ from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
-from urdfkin.system.locks import importing
+from urdfkin.system.locks import import_lock
 
 
-def lazy_import(home: str) -> Callable[..., Any]:
+def lazy_import(target: str) -> Callable[..., Any]:
     """Return a function that calls `module:name`; the first call imports the module."""
-    module, _, name = home.partition(":")
-    get, imported = attrgetter(name), list[Any]()
+    module, _, name = target.partition(":")
+    get, loaded = attrgetter(name), list[Any]()
 
     def call(*arguments: Any, **options: Any) -> Any:
-        if not imported:
-            with importing:
-                imported.append(import_module(module))
-        return get(imported[0])(*arguments, **options)
+        if not loaded:
+            with import_lock:
+                loaded.append(import_module(module))
+        return get(loaded[0])(*arguments, **options)
 
     return call
 
 
-def is_a(x: object, home: str) -> bool:
+def is_instance(x: object, target: str) -> bool:
     """Return whether an object is an instance of the class `module:name`, without importing the module."""
-    module, _, name = home.partition(":")
+    module, _, name = target.partition(":")
     # Before a module is imported, no object can be an instance of a class of the module.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
 
@@ -69,7 +69,7 @@ EXTRAS = {
 }
 
 
-def install_remedy(extra: str) -> str:
+def install_command(extra: str) -> str:
     """Return the command that installs the library of an extra, such as `pip install 'viser>=1'`.
 
     The command names the library, because no package index has urdfkin yet.
@@ -77,16 +77,16 @@ def install_remedy(extra: str) -> str:
     return f"pip install '{EXTRAS[extra]}'"
 
 
-def own_version() -> str:
+def urdfkin_version() -> str:
     return installed_version("urdfkin") or "of a checkout"
 
 
 _HOOKS: dict[str, Callable[..., Any]] = {}
 
 
-def register_hook(word: str, function: Callable[..., Any]) -> None:
-    _HOOKS[word] = function
+def register_hook(name: str, function: Callable[..., Any]) -> None:
+    _HOOKS[name] = function
 
 
-def hook(word: str) -> Callable[..., Any]:
-    return _HOOKS[word]
+def get_hook(name: str) -> Callable[..., Any]:
+    return _HOOKS[name]

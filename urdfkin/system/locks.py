@@ -15,7 +15,7 @@ _locks: list[threading.RLock] = []
 _acquired: dict[int, list[threading.RLock]] = {}
 
 
-def lock_over_forks() -> threading.RLock:
+def make_fork_safe_lock() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
     A fork waits until the lock is free. A fork acquires the newest lock first and the oldest lock last.
@@ -23,7 +23,7 @@ def lock_over_forks() -> threading.RLock:
 
     Use this function only for module variables, because this module stores each lock until the process ends.
     """
-    importing.register()
+    import_lock.register()
     lock = threading.RLock()
     _locks.append(lock)
     return lock
@@ -42,7 +42,7 @@ def _after_fork() -> None:
         lock.release()
 
 
-class _ImportLock:
+class ImportLock:
     """The lock that a thread holds during a lazy import.
 
     Without this lock, another thread could fork a child during the import, and the child would wait for ever
@@ -80,4 +80,4 @@ class _ImportLock:
         self._lock.release()
 
 
-importing = _ImportLock()
+import_lock = ImportLock()

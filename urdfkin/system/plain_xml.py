@@ -12,7 +12,7 @@ from xml.parsers import expat
 from urdfkin.errors import QuestionsSection
 
 
-def plain_xml(text: str) -> Element:
+def parse_xml(text: str) -> Element:
     """Return the root element of a URDF; raise expat.ExpatError if the text is not well-formed."""
     builder = TreeBuilder()
     # Without a namespace separator, expat ignores namespaces.
@@ -25,10 +25,10 @@ def plain_xml(text: str) -> Element:
     return builder.close()
 
 
-def order_words(urdf: str, joints: Sequence[str]) -> str:
+def joint_order_sentence(urdf: str, joints: Sequence[str]) -> str:
     """Return a sentence that says whether the URDF contains its joints in the order `joints` of q."""
     known = set(joints)
-    written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
+    written = [e.get("name", "") for e in parse_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]
     ours_is = "order of joints in q, v and columns: Pinocchio's (depth first, siblings by name)"
     first = next((k for k, pair in enumerate(zip(written, ours, strict=False)) if pair[0] != pair[1]), None)

@@ -15,43 +15,47 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
 
-from urdfkin.system.locks import lock_over_forks
+from urdfkin.system.locks import make_fork_safe_lock
 
 #: Environment variables that a Python interpreter may need to start.
-_NEEDED = ("LD_LIBRARY_PATH",)
+_INHERITED_VARIABLES = ("LD_LIBRARY_PATH",)
 #: One thread for linear algebra, because a confined process has little address space for threads.
-_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
+_EXTRA_VARIABLES = {"OPENBLAS_NUM_THREADS": "1"}
 
 
-def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
+def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
     """Return a command that runs code in a new interpreter.
 
     The new interpreter imports from the folders of `sys.path`, except the current folder and Dask's temporary
     folder.
     """
-    return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
+    return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_import_path()!r}; {code}"]
 
 
-def _path() -> list[str]:
+def _import_path() -> list[str]:
     # Empty and relative entries refer to the current folder.
     home = str(Path(__file__).resolve().parents[2])
-    return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
+    return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)), home]
 
 
-def _is_scratch(entry: str) -> bool:
+def _is_dask_folder(entry: str) -> bool:
     """Return whether an entry is Dask's temporary folder, to which other users can write."""
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
-def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
+def run_python(
+    command: list[str], request: bytes, timeout: float, max_bytes: int
+) -> tuple[bytes, int | None]:
     """Run a process with a minimal environment and a request on standard input.
 
-    The process is killed after `patience` seconds, and after more than `most` bytes of output. Return the
-    output, cut off after `most` + 1 bytes, and the exit status. After a timeout, the status is None.
+    The process is killed after `timeout` seconds, and after more than `max_bytes` bytes of output. Return the
+    output, cut off after `max_bytes` + 1 bytes, and the exit status. After a timeout, the status is None.
     """
     import subprocess
 
-    environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
+    environ = _EXTRA_VARIABLES | {
+        name: os.environ[name] for name in _INHERITED_VARIABLES if name in os.environ
+    }
     pipe = subprocess.PIPE
     timed_out = threading.Event()
     with subprocess.Popen(
@@ -62,15 +66,15 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
             timed_out.set()
             process.kill()
 
-        timer = threading.Timer(patience, give_up)
+        timer = threading.Timer(timeout, give_up)
         timer.start()
         try:
             assert process.stdin is not None
             assert process.stdout is not None
             with suppress(BrokenPipeError), process.stdin:
                 process.stdin.write(request)
-            output = process.stdout.read(most + 1)
-            if len(output) > most:
+            output = process.stdout.read(max_bytes + 1)
+            if len(output) > max_bytes:
                 process.kill()
             status = process.wait()
         finally:
@@ -80,7 +84,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
 
 
 @contextmanager
-def not_reading(settings: str) -> Iterator[None]:
+def avoid_settings_file(settings: str) -> Iterator[None]:
     """Make `/` the current folder if the current folder contains a settings file that must not be read."""
     if not os.path.lexists(settings):
         yield
@@ -96,11 +100,11 @@ def not_reading(settings: str) -> Iterator[None]:
 
 _T = TypeVar("_T")
 
-_USUAL_STACK = 8 * 2**20
-_stack_size_lock = lock_over_forks()
+_DEFAULT_STACK_BYTES = 8 * 2**20
+_stack_size_lock = make_fork_safe_lock()
 
 
-def with_stack(size: int, function: Callable[[], _T]) -> _T:
+def call_with_stack(size: int, function: Callable[[], _T]) -> _T:
     """Return `function()`, called on a stack of at least `size` bytes.
 
     Pinocchio and its parser are recursive: a chain of about 3,000 links overflows a stack of 8 MiB.
@@ -117,7 +121,7 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
 
     # The stack size is a global setting of the process.
     with _stack_size_lock:
-        before = threading.stack_size(max(size, _USUAL_STACK))
+        before = threading.stack_size(max(size, _DEFAULT_STACK_BYTES))
         try:
             thread = threading.Thread(target=run)
             thread.start()

@@ -13,14 +13,14 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    return _file("own robots are", "urdfkin/robots/catalogue.toml", "robots/catalogue.toml").parent
+    return _find_file("own robots are", "urdfkin/robots/catalogue.toml", "robots/catalogue.toml").parent
 
 
 def questions_page() -> Path:
-    return _file("page questions.md is", "urdfkin/questions.md", "docs/questions.md")
+    return _find_file("page questions.md is", "urdfkin/questions.md", "docs/questions.md")
 
 
-def _file(what: str, *paths: str) -> Path:
+def _find_file(what: str, *paths: str) -> Path:
     """Return the first existing path; `paths` are relative to the folder that contains the package."""
     here = Path(__file__).resolve().parents[2]
     if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
@@ -32,7 +32,7 @@ def _file(what: str, *paths: str) -> Path:
 
 @cache
 def example_robots_dir() -> Path:
-    candidates = list(_example_candidates())
+    candidates = list(_example_folder_candidates())
     for folder in candidates:
         if folder.is_dir():
             return folder
@@ -43,7 +43,7 @@ def example_robots_dir() -> Path:
     )
 
 
-def _example_candidates() -> Iterator[Path]:
+def _example_folder_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
     from importlib import metadata
 

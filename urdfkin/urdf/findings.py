@@ -25,10 +25,10 @@ from enum import Enum
 from itertools import islice
 from typing import Any
 
-from urdfkin.errors import UrdfkinError, nearest
+from urdfkin.errors import UrdfkinError, find_similar_names
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.errors.escape import log_line, printable
-from urdfkin.system.files import Edit, edited
+from urdfkin.errors.escape import escape_unprintable, log_line
+from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
 #: Maximum number of characters of a file that a message quotes.
@@ -36,7 +36,7 @@ MAX_QUOTE_LENGTH = 60
 
 
 def shorten(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
-    return printable(text if len(text) <= limit else text[: limit - 3] + "...")
+    return escape_unprintable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
 def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
@@ -76,7 +76,7 @@ class ExcerptFormatter:
         last = first + MAX_EXCERPT_LENGTH
         end = min(start + finding.width, last)
         pieces = self.text[first:start], self.text[start:end], self.text[end:last]
-        before, marked, after = (printable(piece.replace("\t", _TAB)) for piece in pieces)
+        before, marked, after = (escape_unprintable(piece.replace("\t", _TAB)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_display_width(lead) + _display_width(before)) + "^" * max(_display_width(marked), 1)
@@ -119,7 +119,7 @@ def apply_fixes(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
         if fix.edits[0].start >= end:
             taken.append(fix)
             end = fix.edits[-1].end
-    return mark + edited(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
+    return mark + apply_edits(data.removeprefix(mark), [edit for fix in taken for edit in fix.edits]), taken
 
 
 class Severity(Enum):
@@ -201,7 +201,7 @@ class Finding:
             return ""
         tag = shorten(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > MAX_QUOTE_LENGTH:
-            return f"{tag} '...{printable(self.name[3 - MAX_QUOTE_LENGTH :])}'"
+            return f"{tag} '...{escape_unprintable(self.name[3 - MAX_QUOTE_LENGTH :])}'"
         return tag if self.name is None else f"{tag} '{shorten(self.name)}'"
 
     @property
@@ -241,7 +241,7 @@ class Finding:
         return f"{subject}{self.message}{found}{also}{remedy}"
 
     def __str__(self) -> str:
-        place = f"{printable(self.file)}:{self.line}:{self.column}"
+        place = f"{escape_unprintable(self.file)}:{self.line}:{self.column}"
         return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
@@ -261,7 +261,7 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
         return TextDocument(format_counts(self), table)
@@ -516,7 +516,7 @@ class Reporter:
         self._searches += 1
         if self._searches > MAX_SEARCHES:
             return []
-        return nearest(word, islice(known, MAX_CANDIDATES), work=MAX_COMPARED_PAIRS)
+        return find_similar_names(word, islice(known, MAX_CANDIDATES), work=MAX_COMPARED_PAIRS)
 
     def is_full(self, rule: Rule) -> bool:
         group = self._groups.get((rule.id, rule.severity))

@@ -40,7 +40,7 @@ from urdfkin.model.tree import (
     build_tree,
     pose,
 )
-from urdfkin.system.files import at_home, read_start
+from urdfkin.system.files import expand_home, read_start
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
 #: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
@@ -250,7 +250,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _SUFFIXES:
         return False
     try:
-        return is_mjcf(read_start(at_home(source), _SEARCHED_BYTES))
+        return is_mjcf(read_start(expand_home(source), _SEARCHED_BYTES))
     except OSError:
         return False  # `load` reports the error later.
 

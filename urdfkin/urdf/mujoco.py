@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 from urdfkin.errors import InputError
-from urdfkin.system.lazy_import import install_remedy, installed_version
+from urdfkin.system.lazy_import import install_command, installed_version
 
 
 def import_mujoco() -> Any:
@@ -14,7 +14,7 @@ def import_mujoco() -> Any:
     try:
         import mujoco
     except ImportError:
-        raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco")) from None
+        raise InputError("MuJoCo is not installed", remedy=install_command("mujoco")) from None
     return mujoco
 
 
@@ -27,5 +27,5 @@ def compile_spec(spec: Any) -> Any:
 
 def version() -> str:
     if (found := installed_version("mujoco")) is None:
-        raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco"))
+        raise InputError("MuJoCo is not installed", remedy=install_command("mujoco"))
     return found

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeGuard
 
-from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, nearest
+from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, find_similar_names
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
-from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
+from urdfkin.system.files import MAX_BYTES, exists, expand_home, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import CatalogueEntry, catalogue, find_package, split_uri
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
@@ -142,7 +142,7 @@ class UrdfText:
 
 
 def read_source(
-    source: Source, max_bytes: int = MOST, xacro_args: Mapping[str, object] | None = None
+    source: Source, max_bytes: int = MAX_BYTES, xacro_args: Mapping[str, object] | None = None
 ) -> UrdfText:
     """Read a URDF from any source.
 
@@ -158,7 +158,7 @@ def read_source(
     if isinstance(source, str) and "://" in source and (address := split_uri(source)) is not None:
         source = _resolve_package_uri(*address)
     if is_xacro(source):
-        return _expand_xacro(at_home(source), xacro_args or {})
+        return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
         names = ", ".join(map(str, xacro_args))
         raise InputError("`xacro_args` needs the path of a .xacro file", found=names)
@@ -221,7 +221,7 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
     if (entry := find_entry(source)) is not None:
         read = _read_file(entry.path, max_bytes)
         return UrdfText(read.data, read.label, source, entry)
-    path = at_home(source)
+    path = expand_home(source)
     if os.sep in source or path.suffix or exists(path):
         return _read_file(path, max_bytes)
     raise UnknownNameError("robot", source, catalogue(), where="neither a file nor in the catalogue")
@@ -278,5 +278,5 @@ def _nearest_file(path: Path) -> str:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
         return f"the folder {path.parent} does not exist"
-    close = nearest(path.name, names)
+    close = find_similar_names(path.name, names)
     return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"

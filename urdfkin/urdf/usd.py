@@ -45,8 +45,8 @@ from urdfkin.model.tree import (
     inverse,
     pose,
 )
-from urdfkin.system.files import MOST, read_start
-from urdfkin.system.lazy_import import install_remedy, installed_version
+from urdfkin.system.files import MAX_BYTES, read_start
+from urdfkin.system.lazy_import import install_command, installed_version
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.mjcf import SLIDE_LIMIT, depends_on, make_fixed_joint, make_unique, resolve_rule
 from urdfkin.urdf.sources import USD_SUFFIXES
@@ -170,7 +170,7 @@ class Usd:
 def version() -> str:
     found = installed_version("usd-core") or installed_version("usd-exchange")
     if found is None:
-        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd"))
+        raise InputError("OpenUSD is not installed", remedy=install_command("usd"))
     return found
 
 
@@ -178,7 +178,7 @@ def import_openusd() -> Any:
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
-        raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
+        raise InputError("OpenUSD is not installed", remedy=install_command("usd")) from None
     return SimpleNamespace(Ar=Ar, Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdPhysics=UsdPhysics)
 
 
@@ -195,13 +195,13 @@ def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
                 what = "this file is a pointer of Git LFS, not USD"
                 raise InputError(what, where=outer, remedy="run git lfs pull")
             size = Path(outer).stat().st_size
-            if size > MOST:
-                found = f"{size} bytes, over {MOST}"
+            if size > MAX_BYTES:
+                found = f"{size} bytes, over {MAX_BYTES}"
                 raise SourceError("the file is too large", where=outer, found=found)
             total += size
-            if total > MOST:
+            if total > MAX_BYTES:
                 what = "the files of this stage are too large"
-                raise SourceError(what, where=where, found=f"over {MOST} bytes")
+                raise SourceError(what, where=where, found=f"over {MAX_BYTES} bytes")
             files[outer] = None
         layer = pxr.Sdf.Layer.FindOrOpen(identifier)
         if layer is None:

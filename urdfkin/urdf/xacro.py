@@ -22,8 +22,8 @@ from typing import Any
 
 from urdfkin.errors import QuestionsSection, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes
-from urdfkin.system.lazy_import import install_remedy
-from urdfkin.system.processes import ask_python, own_python
+from urdfkin.system.lazy_import import install_command
+from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
@@ -95,10 +95,12 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise SourceError("no such file", where=str(path))
     if find_spec("xacrodoc") is None:
         message = "a .xacro file needs the package xacrodoc"
-        remedy = f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf"
+        remedy = f"{install_command('xacro')}, or expand the file with: xacro FILE > robot.urdf"
         raise XacroError(message, where=str(path), remedy=remedy, question=QuestionsSection.XACRO)
-    command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
-    output, status = ask_python(command, _make_request(path.absolute(), arguments, patience), patience, MOST)
+    command = python_command(
+        "from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8")
+    )
+    output, status = run_python(command, _make_request(path.absolute(), arguments, patience), patience, MOST)
     if status is None:
         raise XacroError("xacro did not finish", where=str(path), found=f"{patience:g} s")
     if len(output) > MOST:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from urdfkin.errors import OracleError, UrdfkinError
-from urdfkin.system.documents import as_data, typed
+from urdfkin.system.documents import as_data, from_data
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict
@@ -118,9 +118,9 @@ def decode_answer(key: str, content: bytes) -> Answer:
     body = unpack(key, content)
     try:
         if "failure" in body:
-            return typed(body["failure"], Failure)
-        error_stats = dict(typed(body["error_stats"], list[tuple[Key, ErrorStats]]))
-        return replace(typed(body["result"], ChunkResult), error_stats=error_stats)
+            return from_data(body["failure"], Failure)
+        error_stats = dict(from_data(body["error_stats"], list[tuple[Key, ErrorStats]]))
+        return replace(from_data(body["result"], ChunkResult), error_stats=error_stats)
     except (ValueError, KeyError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
-from urdfkin.compiled.preload import are_on_disk
+from urdfkin.compiled.preload import all_kernels_on_disk
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
+from urdfkin.errors.validators import as_bool, as_int, as_str, safe_repr
 from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, make_failure, make_unexpected_failure
 from urdfkin.validation.chunk import Chunking
@@ -108,8 +108,8 @@ def validate(
     >>> report.passed, report.robots[0].failed
     (True, 0)
     """
-    samples, seed = whole_number(samples, "samples", 0), whole_number(seed, "seed", 0)
-    jobs, isolate = whole_number(jobs, "jobs", 1), as_bool(isolate, "isolate")
+    samples, seed = as_int(samples, "samples", 0), as_int(seed, "seed", 0)
+    jobs, isolate = as_int(jobs, "jobs", 1), as_bool(isolate, "isolate")
     shard = None if shard is None else as_str(shard, "shard")
     if retry is not None and as_str(retry, "retry") != "failed":
         raise InputError(
@@ -232,7 +232,7 @@ _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _should_compile(samples: int) -> bool:
-    return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
+    return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and all_kernels_on_disk())
 
 
 @dataclass

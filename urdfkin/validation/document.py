@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, NotRequired, TypedDict
 
-from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, of_length, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, doc, of_length
 
 _UNDEFINED = "null: a result is NaN, or two values with the bound 0 differ."
-Units = Annotated[Size | None, says(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
+Units = Annotated[Size | None, doc(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
 BoundRatio = Annotated[
-    float | None, says(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
+    float | None, doc(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
 ]
 ReferenceName = Literal["local", "world", "local_world_aligned"]
 
@@ -24,18 +24,18 @@ ReferenceName = Literal["local", "world", "local_world_aligned"]
 class ReportedLimit(TypedDict):
     """Limits of a joint; null: no limit."""
 
-    lower: Annotated[float | None, says("Lower position limit, rad or m; null: no limit.")]
-    upper: Annotated[float | None, says("Upper position limit, rad or m; null: no limit.")]
-    velocity: Annotated[float | None, says("Limit of the joint velocity, rad/s or m/s; null: no limit.")]
-    effort: Annotated[float | None, says("Limit of the joint torque or force, N m or N; null: no limit.")]
+    lower: Annotated[float | None, doc("Lower position limit, rad or m; null: no limit.")]
+    upper: Annotated[float | None, doc("Upper position limit, rad or m; null: no limit.")]
+    velocity: Annotated[float | None, doc("Limit of the joint velocity, rad/s or m/s; null: no limit.")]
+    effort: Annotated[float | None, doc("Limit of the joint torque or force, N m or N; null: no limit.")]
 
 
 class ReportedMimic(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
-    leader: Annotated[str, says("Name of the mimicked joint.")]
-    multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
-    offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
+    leader: Annotated[str, doc("Name of the mimicked joint.")]
+    multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
+    offset: Annotated[float, doc("Offset that is added to the product, rad or m.")]
 
 
 class ReportedRange(TypedDict):
@@ -44,112 +44,112 @@ class ReportedRange(TypedDict):
     Both ends are null if the mimic joints exceed their limits everywhere in the range.
     """
 
-    lower: Annotated[float | None, says("Lower end, rad or m; null: the part is empty.")]
-    upper: Annotated[float | None, says("Upper end, rad or m; null: the part is empty.")]
-    by: Annotated[list[str], says("Names of the mimic joints that reduce the joint's range.")]
+    lower: Annotated[float | None, doc("Lower end, rad or m; null: the part is empty.")]
+    upper: Annotated[float | None, doc("Upper end, rad or m; null: the part is empty.")]
+    by: Annotated[list[str], doc("Names of the mimic joints that reduce the joint's range.")]
 
 
 class ReportedJoint(TypedDict):
     """A joint. Fixed joints are included."""
 
-    name: Annotated[str, says("Name of the joint in the URDF.")]
+    name: Annotated[str, doc("Name of the joint in the URDF.")]
     kind: Annotated[
         Literal["revolute", "continuous", "prismatic", "fixed", "planar", "floating"],
-        says("Kind of the joint."),
+        doc("Kind of the joint."),
     ]
-    parent: Annotated[str, says("Name of the parent link.")]
-    child: Annotated[str, says("Name of the child link; its frame is the joint's frame after the motion.")]
-    placement: Annotated[Matrix, says("Pose of the joint's frame in the parent link's frame at q = 0.")]
+    parent: Annotated[str, doc("Name of the parent link.")]
+    child: Annotated[str, doc("Name of the child link; its frame is the joint's frame after the motion.")]
+    placement: Annotated[Matrix, doc("Pose of the joint's frame in the parent link's frame at q = 0.")]
     axis: Annotated[
         Annotated[list[float], of_length(3)] | None,
-        says("Unit axis in the joint's frame; null for kinds without an axis."),
+        doc("Unit axis in the joint's frame; null for kinds without an axis."),
     ]
     q: Annotated[
         int | None,
-        says(
+        doc(
             "Index in q of the joint's first coordinate; for a mimic joint, index of the mimicked joint."
             " null: none."
         ),
     ]
-    v: Annotated[int | None, says("Index of the joint's first entry in v and in a; null: none.")]
-    limit: Annotated[ReportedLimit | None, says("The joint's limits; null: the joint has no limits.")]
-    mimic: Annotated[ReportedMimic | None, says("The rule of a mimic joint; null for other joints.")]
+    v: Annotated[int | None, doc("Index of the joint's first entry in v and in a; null: none.")]
+    limit: Annotated[ReportedLimit | None, doc("The joint's limits; null: the joint has no limits.")]
+    mimic: Annotated[ReportedMimic | None, doc("The rule of a mimic joint; null for other joints.")]
     remaining_range: Annotated[
         ReportedRange | None,
-        says(
+        doc(
             "The part of the joint's range in which all its mimic joints are within their limits."
             " null: the joint's whole range."
         ),
     ]
     locked: NotRequired[
-        Annotated[float, says("Value of a locked joint, rad or m. The `kind` of a locked joint is `fixed`.")]
+        Annotated[float, doc("Value of a locked joint, rad or m. The `kind` of a locked joint is `fixed`.")]
     ]
 
 
 class ReportedModel(TypedDict):
     """Links and joints of the robot, in Pinocchio's order."""
 
-    name: Annotated[str, says("The robot's name.")]
-    source: Annotated[str, says("A path, a catalogue name, - for standard input, or <text>.")]
-    path: Annotated[str | None, says("Path of the robot's file; null for a robot given as text.")]
-    sha256: Annotated[Sha256, says("SHA-256 of the URDF's text as UTF-8, or of the MJCF or USD file.")]
+    name: Annotated[str, doc("The robot's name.")]
+    source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
+    path: Annotated[str | None, doc("Path of the robot's file; null for a robot given as text.")]
+    sha256: Annotated[Sha256, doc("SHA-256 of the URDF's text as UTF-8, or of the MJCF or USD file.")]
     mimic: Annotated[
         bool | None,
-        says("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),
+        doc("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),
     ]
     root_joint: Annotated[
         Literal["floating", "planar"] | None,
-        says("Kind of the joint between the world and the root link; null: there is no such joint."),
+        doc("Kind of the joint between the world and the root link; null: there is no such joint."),
     ]
-    nq: Annotated[Count, says("Number of coordinates (length of q).")]
-    nv: Annotated[Count, says("Number of joint velocities (length of v and of a).")]
-    base: Annotated[str, says("Name of the default base frame of chains.")]
-    tip: Annotated[str, says("Name of the default tip frame of chains.")]
-    coordinates: Annotated[list[str], says("Name of each coordinate in q.")]
-    rates: Annotated[list[str], says("Name of each entry of v and a.")]
-    frames: Annotated[list[str], says("Names of all links and joints, as in Pinocchio.")]
-    links: Annotated[list[str], says("Names of all links; links[i + 1] is the child of joints[i].")]
-    joints: Annotated[list[ReportedJoint], says("All joints; a parent link comes before its child links.")]
+    nq: Annotated[Count, doc("Number of coordinates (length of q).")]
+    nv: Annotated[Count, doc("Number of joint velocities (length of v and of a).")]
+    base: Annotated[str, doc("Name of the default base frame of chains.")]
+    tip: Annotated[str, doc("Name of the default tip frame of chains.")]
+    coordinates: Annotated[list[str], doc("Name of each coordinate in q.")]
+    rates: Annotated[list[str], doc("Name of each entry of v and a.")]
+    frames: Annotated[list[str], doc("Names of all links and joints, as in Pinocchio.")]
+    links: Annotated[list[str], doc("Names of all links; links[i + 1] is the child of joints[i].")]
+    joints: Annotated[list[ReportedJoint], doc("All joints; a parent link comes before its child links.")]
 
 
 class ReportedFinding(TypedDict):
     """A finding in the URDF file, as `urdfkin check` reports it."""
 
-    code: Annotated[str, says("A code such as URDF502; `urdfkin explain CODE` explains the code.")]
+    code: Annotated[str, doc("A code such as URDF502; `urdfkin explain CODE` explains the code.")]
     severity: Annotated[
         Literal["error", "warning", "note"],
-        says("Severity of the finding. A file with an error is not compared with Pinocchio."),
+        doc("Severity of the finding. A file with an error is not compared with Pinocchio."),
     ]
-    message: Annotated[str, says("Description of the problem.")]
-    found: Annotated[str | None, says("Text in the file that causes the problem; null: none.")]
-    remedy: Annotated[str | None, says("How to correct the file; null: no remedy is known.")]
-    file: Annotated[str, says("Name of the file with the problem.")]
-    line: Annotated[Count, says("Line number of the problem, counted from 1.")]
-    column: Annotated[Count, says("Column number of the problem, counted from 1.")]
-    element: Annotated[str | None, says("Tag of the XML element with the problem; null: none.")]
-    name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
+    message: Annotated[str, doc("Description of the problem.")]
+    found: Annotated[str | None, doc("Text in the file that causes the problem; null: none.")]
+    remedy: Annotated[str | None, doc("How to correct the file; null: no remedy is known.")]
+    file: Annotated[str, doc("Name of the file with the problem.")]
+    line: Annotated[Count, doc("Line number of the problem, counted from 1.")]
+    column: Annotated[Count, doc("Column number of the problem, counted from 1.")]
+    element: Annotated[str | None, doc("Tag of the XML element with the problem; null: none.")]
+    name: Annotated[str | None, doc("Name of the link or joint with the problem; null: none.")]
     pinocchio_reading: Annotated[
         Literal["refuses", "differs"] | None,
-        says("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
+        doc("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
     ]
     other_lines: Annotated[
-        list[int], says("Line numbers of further findings that are merged into this finding.")
+        list[int], doc("Line numbers of further findings that are merged into this finding.")
     ]
 
 
 class ReportedDHRow(TypedDict):
     """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
 
-    joint: Annotated[str, says("Name of the joint.")]
-    kind: Annotated[Literal["revolute", "continuous", "prismatic"], says("Kind of the joint.")]
-    a: Annotated[float, says("Translation along x.")]
-    alpha: Annotated[float, says("Rotation about x.")]
-    beta: Annotated[float, says("Hayati parameter: rotation about y after alpha; 0 in other rows.")]
-    d: Annotated[float, says("Translation along the joint axis; for a prismatic joint, its constant part.")]
-    theta: Annotated[float, says("Rotation about the joint axis; for a revolute joint, its constant part.")]
+    joint: Annotated[str, doc("Name of the joint.")]
+    kind: Annotated[Literal["revolute", "continuous", "prismatic"], doc("Kind of the joint.")]
+    a: Annotated[float, doc("Translation along x.")]
+    alpha: Annotated[float, doc("Rotation about x.")]
+    beta: Annotated[float, doc("Hayati parameter: rotation about y after alpha; 0 in other rows.")]
+    d: Annotated[float, doc("Translation along the joint axis; for a prismatic joint, its constant part.")]
+    theta: Annotated[float, doc("Rotation about the joint axis; for a revolute joint, its constant part.")]
     sense: Annotated[
         Literal[1, -1],
-        says(
+        doc(
             "1: the joint's value is added to theta or, for a prismatic joint, to d."
             " -1: the joint's value is subtracted."
         ),
@@ -159,7 +159,7 @@ class ReportedDHRow(TypedDict):
 class ReportedDHTable(TypedDict):
     """A table in one convention."""
 
-    rows: Annotated[list[ReportedDHRow], says("Rows of the table from base to tip.")]
+    rows: Annotated[list[ReportedDHRow], doc("Rows of the table from base to tip.")]
     base: Matrix
     tool: Matrix
 
@@ -167,26 +167,26 @@ class ReportedDHTable(TypedDict):
 class Chain(TypedDict):
     """A chain of the robot, with its Denavit-Hartenberg tables."""
 
-    limb: Annotated[str | None, says("Name of the limb in the catalogue; null: none.")]
-    base: Annotated[str, says("Name of the chain's base frame.")]
-    tip: Annotated[str, says("Name of the chain's tip frame.")]
+    limb: Annotated[str | None, doc("Name of the limb in the catalogue; null: none.")]
+    base: Annotated[str, doc("Name of the chain's base frame.")]
+    tip: Annotated[str, doc("Name of the chain's tip frame.")]
     standard: ReportedDHTable
     modified: ReportedDHTable
-    samples: Annotated[Count, says("Number of compared configurations; 0: no comparison.")]
+    samples: Annotated[Count, doc("Number of compared configurations; 0: no comparison.")]
     metres: Annotated[
         float | None,
-        says("Largest distance (metres) between a table's tip and Pinocchio's tip; null: no comparison."),
+        doc("Largest distance (metres) between a table's tip and Pinocchio's tip; null: no comparison."),
     ]
     worst: Annotated[
         Units,
-        says(
+        doc(
             "Largest disagreement of the tip's placement, Jacobian and acceleration, in eps * scale. The"
             " entry covers both tables. null: a result is NaN, or there is no comparison."
         ),
     ]
     bound_ratio: Annotated[
         float | None,
-        says(
+        doc(
             "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
         ),
     ]
@@ -195,22 +195,22 @@ class Chain(TypedDict):
 class ReportedErrors(TypedDict):
     """Errors of one library: differences from values with fifty digits, in eps * scale."""
 
-    worst: Annotated[float, says("Largest error.")]
-    typical: Annotated[float, says("Root mean square of the errors.")]
+    worst: Annotated[float, doc("Largest error.")]
+    typical: Annotated[float, doc("Root mean square of the errors.")]
 
 
 class ReportedAccuracyLine(TypedDict):
     """Accuracy of one quantity in one reference frame."""
 
-    quantity: Annotated[str, says("Name of the quantity: placement, velocity, ...")]
+    quantity: Annotated[str, doc("Name of the quantity: placement, velocity, ...")]
     reference: Annotated[
         ReferenceName | Literal["euler angles", "quaternion"] | None,
-        says(
+        doc(
             "Reference frame; null for a placement. For analytical Jacobians: the representation of the"
             " orientation."
         ),
     ]
-    numbers: Annotated[Count, says("Number of values compared with fifty-digit values.")]
+    numbers: Annotated[Count, doc("Number of values compared with fifty-digit values.")]
     urdfkin: ReportedErrors
     pinocchio: ReportedErrors
 
@@ -218,31 +218,31 @@ class ReportedAccuracyLine(TypedDict):
 class ReportedAccuracy(TypedDict):
     """Result of the accuracy study: differences of urdfkin and Pinocchio from values with fifty digits."""
 
-    robot: Annotated[str, says("The robot's name.")]
-    samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
-    seed: Annotated[int, says("Seed of the random samples.")]
-    moving_base: Annotated[bool, says("Whether the root link had a random motion.")]
-    lines: Annotated[list[ReportedAccuracyLine], says("One entry for each quantity and reference frame.")]
+    robot: Annotated[str, doc("The robot's name.")]
+    samples: Annotated[Count, doc("Number of configurations in the accuracy study.")]
+    seed: Annotated[int, doc("Seed of the random samples.")]
+    moving_base: Annotated[bool, doc("Whether the root link had a random motion.")]
+    lines: Annotated[list[ReportedAccuracyLine], doc("One entry for each quantity and reference frame.")]
 
 
 class Case(TypedDict):
     """The sample with the largest ratio of a disagreement to its bound."""
 
     sample: Annotated[
-        Count, says("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
+        Count, doc("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
     ]
-    frame: Annotated[str, says("Name of the frame: link:NAME or joint:NAME.")]
+    frame: Annotated[str, doc("Name of the frame: link:NAME or joint:NAME.")]
     disagreement: Units
-    q: Annotated[list[float], says("Configuration of the sample.")]
-    v: Annotated[list[float], says("Joint velocities of the sample.")]
-    a: Annotated[list[float], says("Joint accelerations of the sample.")]
-    replay: Annotated[str, says("Command that reproduces the disagreement.")]
+    q: Annotated[list[float], doc("Configuration of the sample.")]
+    v: Annotated[list[float], doc("Joint velocities of the sample.")]
+    a: Annotated[list[float], doc("Joint accelerations of the sample.")]
+    replay: Annotated[str, doc("Command that reproduces the disagreement.")]
 
 
 class ReportedOraclePair(TypedDict):
     """Comparison of one library, urdfkin or Pinocchio, with the second oracle."""
 
-    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
+    failed: Annotated[Count, doc("Number of results with a disagreement above the bound.")]
     worst: Units
     bound_ratio: BoundRatio
 
@@ -250,21 +250,21 @@ class ReportedOraclePair(TypedDict):
 class Alone(TypedDict):
     """Number of results in which one library differs and the other two agree, for each of three libraries."""
 
-    urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
-    pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]
-    second_oracle: Annotated[Count, says("Number of results in which only the second oracle differs.")]
+    urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
+    pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
+    second_oracle: Annotated[Count, doc("Number of results in which only the second oracle differs.")]
 
 
 class SecondOracle(TypedDict):
     """Comparison with a second oracle (a third library). Without a second oracle, this entry is missing."""
 
-    by: Annotated[str, says("Name of the second oracle: mujoco.")]
+    by: Annotated[str, doc("Name of the second oracle: mujoco.")]
     urdfkin: ReportedOraclePair
     pinocchio: ReportedOraclePair
     alone: Alone
     undecided: Annotated[
         Count,
-        says(
+        doc(
             "Number of results that do not show which library is wrong. Either no two of the three libraries"
             " agree, or one library agrees with two others that disagree with each other."
         ),
@@ -274,37 +274,37 @@ class SecondOracle(TypedDict):
 class ReportedCheck(TypedDict):
     """Comparison of one quantity with Pinocchio in one reference frame."""
 
-    quantity: Annotated[str, says("Name of the quantity: placement, velocity, jacobian, ...")]
+    quantity: Annotated[str, doc("Name of the quantity: placement, velocity, jacobian, ...")]
     reference: Annotated[
-        ReferenceName | None, says("Pinocchio's name of the reference frame; null for a placement.")
+        ReferenceName | None, doc("Pinocchio's name of the reference frame; null for a placement.")
     ]
-    results: Annotated[Count, says("Number of compared matrices or six-vectors.")]
-    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
+    results: Annotated[Count, doc("Number of compared matrices or six-vectors.")]
+    failed: Annotated[Count, doc("Number of results with a disagreement above the bound.")]
     median: Units
     p99: Units
     worst: Units
     bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        says("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
+        doc("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
-        says(
+        doc(
             "Number of results in each bin: below the first of `histogram_edges`, between two adjacent"
             " edges, above the last edge."
         ),
     ]
     subjects: Annotated[
         Literal["frames", "joints", "columns"],
-        says(
+        doc(
             "Meaning of the entries of `worst_by_subject`: one for each frame, for each joint, or for each"
             " column of the full Jacobian of all joints."
         ),
     ]
-    worst_by_subject: Annotated[list[Units], says("The largest disagreement of each frame, joint or column.")]
+    worst_by_subject: Annotated[list[Units], doc("The largest disagreement of each frame, joint or column.")]
     worst_case: Annotated[
-        Case | None, says("Sample with the largest ratio of disagreement to bound; null: no comparison.")
+        Case | None, doc("Sample with the largest ratio of disagreement to bound; null: no comparison.")
     ]
     second_oracle: NotRequired[SecondOracle]
 
@@ -313,65 +313,65 @@ class ReportedTimings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
     read: Annotated[
-        float, says("Time of reading the file, of building the models and tables, and of any compilation.")
+        float, doc("Time of reading the file, of building the models and tables, and of any compilation.")
     ]
-    urdfkin: Annotated[float, says("Time of computing with urdfkin.")]
-    pinocchio: Annotated[float, says("Time of computing with Pinocchio.")]
-    compare: Annotated[float, says("Time of computing the bounds and of the comparison.")]
-    second_oracle: NotRequired[Annotated[float, says("Time of computing with the second oracle.")]]
+    urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
+    pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
+    compare: Annotated[float, doc("Time of computing the bounds and of the comparison.")]
+    second_oracle: NotRequired[Annotated[float, doc("Time of computing with the second oracle.")]]
 
 
 class ReportedSecondReading(TypedDict):
     """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
-    by: Annotated[str, says("Name and version of the second URDF parser, yourdfpy.")]
-    joints: Annotated[Count, says("Number of compared joints, fixed joints included.")]
+    by: Annotated[str, doc("Name and version of the second URDF parser, yourdfpy.")]
+    joints: Annotated[Count, doc("Number of compared joints, fixed joints included.")]
     differences: Annotated[
         list[str],
-        says("Differences between urdfkin and yourdfpy that no known fault of yourdfpy explains."),
+        doc("Differences between urdfkin and yourdfpy that no known fault of yourdfpy explains."),
     ]
     known: Annotated[
         list[str],
-        says(
+        doc(
             "Known faults of yourdfpy that explain other differences, with the names of the affected joints."
         ),
     ]
     unread: Annotated[
-        str | None, says("Reason why there is no comparison with yourdfpy; null: there is a comparison.")
+        str | None, doc("Reason why there is no comparison with yourdfpy; null: there is a comparison.")
     ]
 
 
 class ReportedRobot(TypedDict):
     """Report of one robot."""
 
-    source: Annotated[str, says("A path, a catalogue name, - for standard input, or <text>.")]
-    name: Annotated[str, says("The robot's name in the URDF.")]
+    source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
+    name: Annotated[str, doc("The robot's name in the URDF.")]
     verdict: Annotated[
-        Literal["verified", "disagrees", "not verified", "bad input"], says("Verdict on the robot.")
+        Literal["verified", "disagrees", "not verified", "bad input"], doc("Verdict on the robot.")
     ]
-    reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
-    error: Annotated[str | None, says("Traceback of an unexpected error; null: no such error.")]
-    joints: Annotated[list[str], says("Names of the moving joints, mimic joints included.")]
-    frames: Annotated[list[str], says("Names of the compared links and joints.")]
-    samples: Annotated[Count, says("Number of compared configurations, including the three special ones.")]
-    results: Annotated[Count, says("Number of results compared with Pinocchio.")]
-    failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
-    seconds: Annotated[float, says("Computing time of this robot, seconds.")]
+    reason: Annotated[str | None, doc("Reason why the robot is not verified; null if it is verified.")]
+    error: Annotated[str | None, doc("Traceback of an unexpected error; null: no such error.")]
+    joints: Annotated[list[str], doc("Names of the moving joints, mimic joints included.")]
+    frames: Annotated[list[str], doc("Names of the compared links and joints.")]
+    samples: Annotated[Count, doc("Number of compared configurations, including the three special ones.")]
+    results: Annotated[Count, doc("Number of results compared with Pinocchio.")]
+    failed: Annotated[Count, doc("Number of results with a disagreement above the bound.")]
+    seconds: Annotated[float, doc("Computing time of this robot, seconds.")]
     timings: Annotated[
-        ReportedTimings | None, says("Computing times of the parts of the validation; null: unknown.")
+        ReportedTimings | None, doc("Computing times of the parts of the validation; null: unknown.")
     ]
-    model: Annotated[ReportedModel | None, says("Links and joints; null: the file could not be read.")]
-    findings: Annotated[list[ReportedFinding], says("Findings of the linter in the robot's file.")]
-    chains: Annotated[list[Chain], says("Chains of the robot with their Denavit-Hartenberg tables.")]
+    model: Annotated[ReportedModel | None, doc("Links and joints; null: the file could not be read.")]
+    findings: Annotated[list[ReportedFinding], doc("Findings of the linter in the robot's file.")]
+    chains: Annotated[list[Chain], doc("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
         ReportedSecondReading | None,
-        says("Comparison with the tree that yourdfpy reads from the same text; null: no comparison."),
+        doc("Comparison with the tree that yourdfpy reads from the same text; null: no comparison."),
     ]
     checks: Annotated[
-        list[ReportedCheck], says("Comparisons with Pinocchio, one for each quantity and reference frame.")
+        list[ReportedCheck], doc("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
     accuracy: Annotated[
-        ReportedAccuracy | None, says("Result of the accuracy study; null without `--accuracy`.")
+        ReportedAccuracy | None, doc("Result of the accuracy study; null without `--accuracy`.")
     ]
 
 
@@ -382,23 +382,23 @@ class Document(Header):
     the meaning of an entry, the layout gets a new version.
     """
 
-    started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
+    started: Annotated[str, doc("Start time of the validation, ISO 8601, UTC.")]
     seconds: Annotated[
         float,
-        says(
+        doc(
             "Wall time of the validation in seconds. In a report from a folder of stored results, the"
             " entry is the sum of the robots' computing times."
         ),
     ]
-    seed: Annotated[int, says("Seed of the random samples.")]
-    samples: Annotated[Count, says("Number of random configurations for each robot.")]
-    histogram_edges: Annotated[list[float], says("Edges of the bins of all histograms, in eps * scale.")]
+    seed: Annotated[int, doc("Seed of the random samples.")]
+    samples: Annotated[Count, doc("Number of random configurations for each robot.")]
+    histogram_edges: Annotated[list[float], doc("Edges of the bins of all histograms, in eps * scale.")]
     robots_requested: Annotated[
-        Count, says("Number of robots in the validation, including those without a report.")
+        Count, doc("Number of robots in the validation, including those without a report.")
     ]
-    interrupted: Annotated[bool, says("Whether the validation ended early, or its store is incomplete.")]
-    reason: Annotated[str | None, says("One-line reason why the validation has not passed; null: passed.")]
-    robots: Annotated[list[ReportedRobot], says("Reports of the robots in the requested order.")]
+    interrupted: Annotated[bool, doc("Whether the validation ended early, or its store is incomplete.")]
+    reason: Annotated[str | None, doc("One-line reason why the validation has not passed; null: passed.")]
+    robots: Annotated[list[ReportedRobot], doc("Reports of the robots in the requested order.")]
 
 
 # -- outcome --------------------------------------------------------------------------------------------

@@ -21,13 +21,13 @@ import numpy as np
 
 from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
+from urdfkin.errors.validators import as_bool, as_finite_float, as_int, safe_repr
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.configuration import draw_samples
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.validation.diagnosis import Diagnosis, Mistakes, as_tuple, diagnose
 from urdfkin.verify.bounds import result_k
 from urdfkin.verify.comparison import disagreement
@@ -179,9 +179,9 @@ class FunctionCheck(Displayable):
         >>> check.as_dict()["agrees"]
         True
         """
-        return {"agrees": self.agrees, **plain(self), "versions": versions()}
+        return {"agrees": self.agrees, **as_json_data(self), "versions": versions()}
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         of = f"{self.quantity} of {self.frame}" + (f" ({self.reference})" if self.reference else "")
         verdict = "agrees" if self.agrees else "DISAGREES"
         parts: list[str | Table] = [
@@ -310,9 +310,9 @@ def verify_function(
         row,
         frame or robot.tip_frame,
         None if not row.referred else Reference.of(reference),
-        whole_number(samples, "samples", 0),
-        whole_number(seed, "seed", 0),
-        real_number(factor, "factor"),
+        as_int(samples, "samples", 0),
+        as_int(seed, "seed", 0),
+        as_finite_float(factor, "factor"),
         as_bool(batch, "batch"),
         options,
     )

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from urdfkin.errors.display import Displayable, Table, TextDocument
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.system.files import read_bytes
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 from urdfkin.urdf.catalogue import example_robots
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Timings
@@ -182,13 +182,13 @@ class ValidationReport(Displayable):
 
     def to_html(self) -> str:
         """Return the report as one offline HTML page, as `urdfkin validate --html` writes it."""
-        return str(hook("a report as a page")(self.as_dict()))
+        return str(get_hook("a report as a page")(self.as_dict()))
 
     def to_markdown(self) -> str:
         """Return the report as Markdown for a pull request, as `urdfkin validate --markdown` writes it."""
-        return str(hook("a report as a comment")(self.as_dict()))
+        return str(get_hook("a report as a comment")(self.as_dict()))
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         heads = ("robot", "verdict", "results", "outside", "worst [eps*scale]", "of the bound")
         rows = []
         for robot in self.robots:
@@ -257,7 +257,7 @@ class ValidationReport(Displayable):
                 robot.as_dict(next(studies, None) if robot.error_stats else None) for robot in self.robots
             ],
         }
-        return cast("Document", plain(document))
+        return cast("Document", as_json_data(document))
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:

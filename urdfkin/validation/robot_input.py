@@ -20,7 +20,7 @@ from urdfkin.dh.parse_table import is_table_file
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, OracleError, UrdfkinError
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load, robot_of
+from urdfkin.robot.loading import load, make_robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding, UrdfWarning
 from urdfkin.urdf.mjcf import is_mjcf
@@ -82,14 +82,14 @@ class RobotInput:
     def read(self) -> Robot:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
-            robot = robot_of(
+            robot = make_robot(
                 self.text(),
                 mimic=self.origin.mimic,
                 root_joint=self.origin.root_joint,
                 oracle=ORACLES[self.origin.oracle or PINOCCHIO.name].name,
                 lock=dict(self.origin.lock),
-                listed=self.listed,
-                made=self.made,
+                source_findings=self.listed,
+                is_generated=self.made,
             )
         robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
@@ -135,7 +135,7 @@ def make_robot_input(
     robot_input = _make_robot_input(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
         return robot_input
-    return replace(robot_input, origin=robot_input.read().locked(lock, joints).origin)
+    return replace(robot_input, origin=robot_input.read().with_locked_joints(lock, joints).origin)
 
 
 def _make_robot_input(

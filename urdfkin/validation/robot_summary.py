@@ -17,11 +17,11 @@ from typing import Any, cast
 import numpy as np
 
 from urdfkin.dh import DHTable
-from urdfkin.dh.make import dh_table
+from urdfkin.dh.make import make_dh_table
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import RangeReduction, draw_samples, range_reductions
 from urdfkin.robot import Robot
-from urdfkin.system.documents import plain
+from urdfkin.system.documents import as_json_data
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding
 from urdfkin.validation.document import Chain, ReportedDHRow, ReportedModel, ReportedSecondReading
@@ -58,7 +58,7 @@ def describe(robot: Robot) -> ReportedModel:
         "links": robot.link_names,
         "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
     }
-    return cast("ReportedModel", plain(data))
+    return cast("ReportedModel", as_json_data(data))
 
 
 def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[str, Any]:
@@ -99,12 +99,12 @@ def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
     found = []
     for limb, base, tip in _chains(robot):
         try:
-            tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
+            tables = {name: make_dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
             continue  # Denavit-Hartenberg tables contain no planar or floating joints.
         if any(table.rows for table in tables.values()):
             found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
-    return tuple(plain(found))
+    return tuple(as_json_data(found))
 
 
 def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
@@ -155,7 +155,7 @@ class RobotSummary:
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
+        reading = as_json_data(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property

@@ -35,8 +35,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.system.documents import DocumentKind, as_data, parse_json, typed
-from urdfkin.system.files import read_bytes, read_if_there
+from urdfkin.system.documents import DocumentKind, as_data, from_data, parse_json
+from urdfkin.system.files import read_bytes, read_if_exists
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.answer import (
     Answer,
@@ -121,7 +121,7 @@ class Manifest:
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
         layout = DocumentKind(_LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
-        return layout.checked(parse_json(content, where), where)
+        return layout.validate(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
         own, theirs = (
@@ -178,7 +178,7 @@ class Store:
         """Return the decoded content of a file; None if the file is missing or damaged."""
         path = self._path_of(key, kind)
         try:
-            content = read_if_there(path)
+            content = read_if_exists(path)
             return None if content is None else decode(key, content)
         except (DamagedError, OSError) as error:
             why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)
@@ -473,9 +473,9 @@ class AccuracyStore:
     def from_store(cls, store: Store) -> AccuracyStore | None:
         """Return the results in a store; None if there are none, or the settings are unreadable."""
         try:
-            if (content := read_if_there(store.folder / _STUDY_FILE)) is None:
+            if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
                 return None
-            settings = typed(json.loads(content), StudySettings)
+            settings = from_data(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.notify(
                 f"{store.folder / _STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
@@ -524,7 +524,7 @@ def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
     data = unpack(key, content).get("accuracy")
     try:
         if isinstance(data, dict) and "reason" in data:
-            return typed(data, FailedStudy)
-        return typed(data, AccuracyStudy)
+            return from_data(data, FailedStudy)
+        return from_data(data, AccuracyStudy)
     except ValueError as error:
         raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

@@ -29,21 +29,14 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
-from urdfkin.system.documents import Count, DocumentKind, Sha256, Size, of_length, says
-from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
+from urdfkin.system.documents import Count, DocumentKind, Sha256, Size, doc, of_length
+from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.verify.bounds import true_value_magnitudes
-from urdfkin.verify.exact.numbers import (
-    DIGITS,
-    conversion,
-    decimal,
-    enough_digits,
-    precision,
-    read_exact,
-)
+from urdfkin.verify.exact.numbers import DIGITS, conversion, decimal, enough_digits, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.quantities import (
     ACCELERATION,
@@ -87,10 +80,10 @@ QUANTITIES = (
 class JointEntry(TypedDict):
     """A joint with coordinates, and the indices of the joint's numbers in q, v and a."""
 
-    name: Annotated[str, says("Name of the joint.")]
-    type: Annotated[str, says("Type of the joint in the URDF.")]
-    q: Annotated[list[Count], of_length(2), says("First index in q, and the index after the last.")]
-    v: Annotated[list[Count], of_length(2), says("First index in v and a, and the index after the last.")]
+    name: Annotated[str, doc("Name of the joint.")]
+    type: Annotated[str, doc("Type of the joint in the URDF.")]
+    q: Annotated[list[Count], of_length(2), doc("First index in q, and the index after the last.")]
+    v: Annotated[list[Count], of_length(2), doc("First index in v and a, and the index after the last.")]
 
 
 class Result(TypedDict):
@@ -105,46 +98,46 @@ class Result(TypedDict):
         "acceleration",
         "spatial acceleration",
     ]
-    frame: Annotated[str, says("Name of a link.")]
+    frame: Annotated[str, doc("Name of a link.")]
     reference: Annotated[
         Literal["local", "world", "local_world_aligned"] | None,
-        says("Reference frame; null for a placement."),
+        doc("Reference frame; null for a placement."),
     ]
-    shape: Annotated[list[Count], says("Shape of the result. The last index varies fastest in the lists.")]
-    k: Annotated[Size, says("The tolerance in multiples of 2^-52 times the size of the terms.")]
-    value: Annotated[list[float], says("The true values, rounded to 17 significant digits.")]
+    shape: Annotated[list[Count], doc("Shape of the result. The last index varies fastest in the lists.")]
+    k: Annotated[Size, doc("The tolerance in multiples of 2^-52 times the size of the terms.")]
+    value: Annotated[list[float], doc("The true values, rounded to 17 significant digits.")]
     tolerance: Annotated[
-        list[float], says("Largest allowed difference from the true value; 0: the result must be equal.")
+        list[float], doc("Largest allowed difference from the true value; 0: the result must be equal.")
     ]
 
 
 class Sample(TypedDict):
     """A configuration with joint velocities and accelerations, and its results."""
 
-    q: Annotated[list[float], says("Coordinates: rad, m, quaternion x y z w.")]
+    q: Annotated[list[float], doc("Coordinates: rad, m, quaternion x y z w.")]
     v: Annotated[
         list[float],
-        says("Joint velocities. The velocities of a planar or floating joint are in the child link's axes."),
+        doc("Joint velocities. The velocities of a planar or floating joint are in the child link's axes."),
     ]
-    a: Annotated[list[float], says("Joint accelerations: the time derivatives of v.")]
+    a: Annotated[list[float], doc("Joint accelerations: the time derivatives of v.")]
     results: list[Result]
 
 
 class Vectors(TypedDict):
     """Test vectors of one robot."""
 
-    schema: Annotated[str, says("Name and version of the layout of this document.")]
-    version: Annotated[str, says("Version of the vectors.")]
+    schema: Annotated[str, doc("Name and version of the layout of this document.")]
+    version: Annotated[str, doc("Version of the vectors.")]
     license: Annotated[
-        str | None, says("SPDX identifier of the licence; null: the licence of the robot's file applies.")
+        str | None, doc("SPDX identifier of the licence; null: the licence of the robot's file applies.")
     ]
-    robot: Annotated[str, says("Name of the feature or robot.")]
-    file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
-    sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
-    rule: Annotated[str | None, says("The rule of the URDF standard that this robot tests, or null.")]
+    robot: Annotated[str, doc("Name of the feature or robot.")]
+    file: Annotated[str, doc("Path of the URDF, in this folder or in example-robot-data.")]
+    sha256: Annotated[Sha256, doc("SHA-256 of the URDF file.")]
+    rule: Annotated[str | None, doc("The rule of the URDF standard that this robot tests, or null.")]
     note: Annotated[
         str | None,
-        says("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
+        doc("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
     ]
     joints: list[JointEntry]
     samples: list[Sample]
@@ -329,7 +322,7 @@ def name_of(robot: Robot) -> str:
 def write_sums(folder: Path, written: Sequence[VectorFiles]) -> Path:
     """Write SHA256SUMS for all files, in the format of `sha256sum --check`."""
     lines = [
-        f"{hashlib.sha256(read_bytes(path, MOST_DATA)).hexdigest()}  {path.name}\n"
+        f"{hashlib.sha256(read_bytes(path, MAX_DATA_BYTES)).hexdigest()}  {path.name}\n"
         for one in written
         for path in one.files
     ]

@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from queue import SimpleQueue
 from typing import cast
 
-from urdfkin.system.processes import own_python
+from urdfkin.system.processes import python_command
 from urdfkin.validation.answer import (
     CRASHED,
     CRASHED_TWICE,
@@ -74,7 +74,7 @@ def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
     The interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
     process, which then saves the finished results.
     """
-    command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
+    command = python_command(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
 
 

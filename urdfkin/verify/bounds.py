@@ -107,12 +107,12 @@ def magnitudes(
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
     inputs = (q, base) if v is None or a is None else (q, base, v, a)
-    kernel = preload.kernel("lengths", home=KERNELS) if n > 1 and len(inputs) > 2 else None
+    kernel = preload.get_kernel("lengths", module=KERNELS) if n > 1 and len(inputs) > 2 else None
     if kernel is None:
         begin = time.thread_time()
         _by_steps(lengths, inputs, out)
         if n > 1:
-            preload.spend("lengths", time.thread_time() - begin)
+            preload.add_time("lengths", time.thread_time() - begin)
     else:
         _by_kernel(kernel, lengths, inputs, out)
     is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
@@ -229,13 +229,13 @@ _FREE_PARTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3
 
 def _displacement(link: _MovingJoint, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
-    if link.kind != JointMotion.SLIDE:
+    if link.kind != JointMotion.PRISMATIC:
         return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
 def _place(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
-    turns = link.kind == JointMotion.TURN
+    turns = link.kind == JointMotion.REVOLUTE
     return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
 
 
@@ -254,7 +254,7 @@ def _step(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> Link
         displacement, *rates = _free_lengths(link, q, v, a)
         return steps.after_free_joint(state, d + displacement, *rates)
     rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
-    if kind == JointMotion.SLIDE:
+    if kind == JointMotion.PRISMATIC:
         return steps.after_prismatic(state, d + _displacement(link, q), rate, rate_2)
     return steps.after_revolute(state, d, rate, rate_2)
 
@@ -544,7 +544,7 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
     step, rate = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
-    turns, size_of = plan.columns[:, ColumnField.TURNS] == 1, np.abs(plan.multipliers)
+    turns, size_of = plan.columns[:, ColumnField.IS_ROTATION] == 1, np.abs(plan.multipliers)
     for f, (_, frame) in enumerate(plan.frames):
         on_path = np.flatnonzero(plan.leaders[f] >= 0)
         i, j = on_path[:, np.newaxis], on_path[np.newaxis, :]
@@ -639,7 +639,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
         weights = np.zeros((2, len(plan.frames), plan.nv))
         for f, (_, frame) in enumerate(plan.frames):
             for c in np.flatnonzero(plan.leaders[f] >= 0):
-                kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
+                kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
         # The array is stored only when it is complete, because other threads may read the cache.
@@ -655,7 +655,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
-    turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
+    turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     multipliers = plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, frame) in enumerate(plan.frames):
@@ -671,6 +671,6 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
         for c in np.flatnonzero((plan.leaders[f] >= 0) & (plan.multipliers != 0.0)):
             column = plan.columns[c]
             rows = found[frame, :, column[ColumnField.V]]
-            rows[:3] |= not column[ColumnField.TURNS] or has_lever[column[ColumnField.STEP]]
-            rows[3:] |= column[ColumnField.TURNS] == 1
+            rows[:3] |= not column[ColumnField.IS_ROTATION] or has_lever[column[ColumnField.STEP]]
+            rows[3:] |= column[ColumnField.IS_ROTATION] == 1
     return found

@@ -13,16 +13,16 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.documents import Count, DocumentKind, Header, Size, plain, says
-from urdfkin.system.files import at_home, write_file
-from urdfkin.system.locks import lock_over_forks
+from urdfkin.system.documents import Count, DocumentKind, Header, Size, as_json_data, doc
+from urdfkin.system.files import expand_home, write_file
+from urdfkin.system.locks import make_fork_safe_lock
 from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
 CHECK_TURNED_OFF = "the check was turned off by verify=False"
-_ledger_lock = lock_over_forks()
+_ledger_lock = make_fork_safe_lock()
 
 
 class VerificationError(UrdfkinError):
@@ -94,30 +94,30 @@ class CertificateLine:
 class LineEntry(TypedDict):
     """The line about one quantity in the JSON file of a certificate."""
 
-    quantity: Annotated[str, says("Name of the quantity.")]
-    checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
+    quantity: Annotated[str, doc("Name of the quantity.")]
+    checked: Annotated[Count, doc("Number of results that the oracle confirmed.")]
     worst: Annotated[
         Size | None,
-        says("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
+        doc("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
     ]
     share: Annotated[
-        Size | None, says("Largest ratio of a difference to its bound; null: the ratio is not finite.")
+        Size | None, doc("Largest ratio of a difference to its bound; null: the ratio is not finite.")
     ]
-    unchecked: Annotated[Count, says("Number of results that were returned without a check.")]
+    unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
 
 
 class CertificateDocument(Header):
     """A saved certificate as plain data: the checked and the unchecked results of a robot."""
 
-    robot: Annotated[str, says("The robot's name.")]
-    source: Annotated[str, says("Source of the robot: a path, a catalogue name, or <text>.")]
+    robot: Annotated[str, doc("The robot's name.")]
+    source: Annotated[str, doc("Source of the robot: a path, a catalogue name, or <text>.")]
     reading: Annotated[
-        str, says("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
+        str, doc("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
     ]
-    oracle: Annotated[str, says("Name and version of the oracle.")]
-    lines: Annotated[list[LineEntry], says("One entry for each computed quantity.")]
+    oracle: Annotated[str, doc("Name and version of the oracle.")]
+    lines: Annotated[list[LineEntry], doc("One entry for each computed quantity.")]
     not_verified: Annotated[
-        list[str], says("Reasons why results were not checked; empty if all were checked.")
+        list[str], doc("Reasons why results were not checked; empty if all were checked.")
     ]
 
 
@@ -192,7 +192,7 @@ class Certificate(Displayable):
             "lines": self.lines,
             "not_verified": self.not_verified,
         }
-        return cast("CertificateDocument", plain(document))
+        return cast("CertificateDocument", as_json_data(document))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the certificate as JSON; if an error occurs, no partial file remains.
@@ -211,9 +211,9 @@ class Certificate(Displayable):
         ...     path.exists()
         True
         """
-        write_file(at_home(path), (json_text(self.as_dict()) + "\n").encode())
+        write_file(expand_home(path), (json_text(self.as_dict()) + "\n").encode())
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")
         rows = [
             (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share:.1%}")

@@ -98,11 +98,11 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     shape = (1, *ours.shape[1:]) if shared else ours.shape
     one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
     size = _rows(scale, shape, math.prod(shape[:axes]), numbers)
-    if (kernel := preload.kernel("worst", home=KERNELS)) is None:
+    if (kernel := preload.get_kernel("worst", module=KERNELS)) is None:
         begin = time.thread_time()
         scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
         worst: FloatArray = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
-        preload.spend("worst", time.thread_time() - begin)
+        preload.add_time("worst", time.thread_time() - begin)
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
@@ -122,6 +122,6 @@ def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatA
 
 def load_kernels() -> None:
     """Compile or load all Numba kernels, so that worker processes do not compile them."""
-    preload.load_kernels()
+    preload.load_all_kernels()
     for name in (*CHECKS, "lengths"):
-        preload.load(name, KERNELS)
+        preload.load_kernel(name, KERNELS)

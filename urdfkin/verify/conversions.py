@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
-from urdfkin.dh.common_normals import left_out
+from urdfkin.dh.common_normals import sum_zeroed_tilts
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.structure import Opw
+from urdfkin.dh.structure import OpwParameters
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.roundings import (
@@ -108,7 +108,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     )
 
 
-def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
+def check_opw(verifier: Verifier, path: FrameChain, found: OpwParameters) -> str | None:
     if verifier.cannot() is not None:
         return None
     q, base, tip = _sampled_ends(verifier, path.base, path.tip)
@@ -132,7 +132,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
-    unit = EPS * (joint_roundings(joints) + size) + left_out(path)
+    unit = EPS * (joint_roundings(joints) + size) + sum_zeroed_tilts(path)
     allowed = screws.rounding(coordinates) + unit * (lever + size)
     share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())

@@ -14,17 +14,17 @@ from types import ModuleType
 from typing import Any
 
 from urdfkin.compiled.machine.compiling import (
-    NUMBERS,
-    PLACES,
-    ROWS,
-    SCRATCH,
-    STATES,
-    TABLE,
-    WHOLE,
-    helper,
+    FLOATS_1D,
+    FLOATS_2D,
+    INTS_1D,
+    INTS_2D,
+    WRITABLE_FLOATS_1D,
+    WRITABLE_FLOATS_3D,
+    WRITABLE_INTS_1D,
+    inline_function,
     kernel,
 )
-from urdfkin.compiled.machine.memory import fetch, numbers_at
+from urdfkin.compiled.machine.memory import doubles_at, prefetch
 from urdfkin.compiled.plan import JointMotion
 from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bind_equations, rebind_functions
@@ -36,7 +36,7 @@ _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
 _AHEAD = 4
 
 
-@helper(fastmath={"reassoc"})
+@inline_function(fastmath={"reassoc"})
 def _finite(x, i):
     # If a number is inf or NaN, the product of 0 and this number is NaN.
     total = 0.0
@@ -45,7 +45,7 @@ def _finite(x, i):
     return total == 0.0
 
 
-@helper(fastmath={"reassoc"})
+@inline_function(fastmath={"reassoc"})
 def _finite_difference(x, y, i):
     total = 0.0
     for j in range(x.shape[1]):
@@ -53,13 +53,13 @@ def _finite_difference(x, y, i):
     return total == 0.0
 
 
-@helper(fastmath={"nnan", "nsz"})
+@inline_function(fastmath={"nnan", "nsz"})
 def _units(difference, size):
     must_be_equal = math.inf if difference > 0.0 else 0.0
     return difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
 
 
-@helper(fastmath={"nnan", "nsz"})
+@inline_function(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
     """Return the largest difference in row `i`, in units of eps * `scale[k]`, for finite numbers."""
     largest = 0.0
@@ -68,7 +68,7 @@ def _largest(ours, theirs, scale, i, k):
     return largest
 
 
-@helper()
+@inline_function()
 def _is_in_threes(scale, k):
     """Return whether the three linear rows of `scale[k]` are equal, and the three angular rows are equal."""
     width = scale.shape[1] // 6
@@ -79,7 +79,7 @@ def _is_in_threes(scale, k):
     return equal
 
 
-@helper()
+@inline_function()
 def _divide_threes(ours, theirs, unit, width, units):
     """For each column of three rows, write the largest difference between `ours` and `theirs` to `units`.
 
@@ -96,7 +96,7 @@ def _divide_threes(ours, theirs, unit, width, units):
         units[j] = (multiple if largest != 0.0 else 0.0) + (0.0 * x + 0.0 * y + 0.0 * z)
 
 
-@helper()
+@inline_function()
 def _most(x, count):
     """Return the bit pattern of the largest of several numbers, which are non-negative, inf or NaN.
 
@@ -109,7 +109,16 @@ def _most(x, count):
     return most
 
 
-@kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
+@kernel(
+    FLOATS_2D,
+    FLOATS_2D,
+    FLOATS_2D,
+    WRITABLE_FLOATS_1D,
+    WRITABLE_INTS_1D,
+    WRITABLE_FLOATS_1D,
+    WRITABLE_FLOATS_1D,
+    WRITABLE_INTS_1D,
+)
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
@@ -123,7 +132,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
         known = known and _finite(scale, k)
         in_threes = in_threes and _is_in_threes(scale, k)
     in_threes = in_threes and known
-    width, address = ours.shape[1] // 6, numbers_at(ours.ctypes.data)
+    width, address = ours.shape[1] // 6, doubles_at(ours.ctypes.data)
     numbers = 6 * width
     if in_threes:
         for k in range(len(scale)):
@@ -133,7 +142,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     for i in range(len(out)):
         k = i % len(scale)
         if in_threes:
-            fetch(address, min(i + _AHEAD, len(out) - 1) * numbers, numbers)
+            prefetch(address, min(i + _AHEAD, len(out) - 1) * numbers, numbers)
             for first in (0, 3 * width):
                 rows, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
                 _divide_threes(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
@@ -145,7 +154,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     return 0
 
 
-@kernel(ROWS, PLACES, PLACES, NUMBERS, SCRATCH)
+@kernel(FLOATS_2D, INTS_1D, INTS_1D, FLOATS_1D, WRITABLE_FLOATS_1D)
 def coupling(full, columns, index, factor, out):
     """Add the weighted Jacobian columns of all joints to `out`, which contains zeros at first."""
     nv = len(out) // max(1, len(full))
@@ -157,24 +166,24 @@ def coupling(full, columns, index, factor, out):
 
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
-_TURN, _SLIDE = int(JointMotion.TURN), int(JointMotion.SLIDE)
+_TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
 #: Number of bounds (p, w, vel, alpha, acc) for each link.
 #: `free` contains the same number of lengths for each planar or floating joint.
 _STATE = _FREE = 5
 
 
-@helper()
+@inline_function()
 def _sum(x, y):
     return x + y
 
 
-@helper()
+@inline_function()
 def _product(x, y):
     """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` does."""
     return SMALLEST_NORMAL if x * y < SMALLEST_NORMAL and x != 0.0 and y != 0.0 else x * y
 
 
-@helper()
+@inline_function()
 def _unturned(R, x):
     return x
 
@@ -187,29 +196,29 @@ _LENGTHS = {
 }
 # Numba can call functions that are attributes of a module.
 _EQUATIONS: Any = ModuleType("length_equations")
-vars(_EQUATIONS).update(vars(bind_equations(decorate=helper(), **_LENGTHS)))
-_STEPS = rebind_functions(steps, decorate=helper(), replacements={"eq": _EQUATIONS})
+vars(_EQUATIONS).update(vars(bind_equations(decorate=inline_function(), **_LENGTHS)))
+_STEPS = rebind_functions(steps, decorate=inline_function(), replacements={"eq": _EQUATIONS})
 _translate_point, _after_revolute, _after_prismatic, _after_free_joint = (
     _STEPS[name] for name in ("translate_point", "after_revolute", "after_prismatic", "after_free_joint")
 )
 
 
-@helper()
+@inline_function()
 def _state(x, i):
     return x[0, i], x[1, i], x[2, i], x[3, i], x[4, i]
 
 
-@helper()
+@inline_function()
 def _put(x, i, state):
     x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] = state
 
 
-@helper()
+@inline_function()
 def _of_row(x, row, at):
     return x[row, at], x[row, at + 1], x[row, at + 2], x[row, at + 3], x[row, at + 4]
 
 
-@helper()
+@inline_function()
 def _read(x, first, m, at, factor, to):
     """Write factor * |x[k, at]| to `to`, for the m rows k = first, first + 1, and so on.
 
@@ -220,20 +229,20 @@ def _read(x, first, m, at, factor, to):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))
 
 
-@helper()
+@inline_function()
 def _over_turn(before, after, m, d, rates):
     for i in range(m):
         _put(after, i, _after_revolute(_state(before, i), d, rates[0, i], rates[1, i]))
 
 
-@helper()
+@inline_function()
 def _over_slide(before, after, m, d, constant, rates):
     for i in range(m):
         length = d + (rates[2, i] + constant)
         _put(after, i, _after_prismatic(_state(before, i), length, rates[0, i], rates[1, i]))
 
 
-@helper()
+@inline_function()
 def _over_free(before, after, first, m, d, free, at):
     step = 1 if len(free) > 1 else 0
     for i in range(m):
@@ -241,7 +250,19 @@ def _over_free(before, after, first, m, d, free, at):
         _put(after, i, _after_free_joint(_state(before, i), d + displacement, o, u, o_rate, u_rate))
 
 
-@kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
+@kernel(
+    INTS_2D,
+    FLOATS_2D,
+    INTS_2D,
+    FLOATS_1D,
+    FLOATS_2D,
+    FLOATS_2D,
+    FLOATS_2D,
+    FLOATS_2D,
+    FLOATS_2D,
+    WRITABLE_FLOATS_3D,
+    WRITABLE_FLOATS_1D,
+)
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
     """Write the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes` to `out`.
 

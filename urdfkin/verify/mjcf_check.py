@@ -22,12 +22,12 @@ import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.kinematics.roundings import EPS, MJCF_RULE_ROUNDINGS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, LinkFrame
-from urdfkin.system.files import at_home
-from urdfkin.system.processes import ask_python, own_python
+from urdfkin.system.files import expand_home
+from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.mjcf import MjcfRemark, is_text, source_name
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
@@ -72,7 +72,7 @@ def read_mjcf(
     version()
     name = source_name(source)
     text = isinstance(source, bytes) or is_text(source)
-    path = None if text else str(at_home(os.fspath(source)))  # type: ignore[arg-type]
+    path = None if text else str(expand_home(os.fspath(source)))  # type: ignore[arg-type]
     request = {
         "path": path,
         "text": _text(source, name) if text else None,
@@ -95,7 +95,7 @@ def read_mjcf(
         tuple(MjcfRemark(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
-        None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_QUOTED],
+        None if read[-1]["whole"] else escape_unprintable((reasons or [ending])[0])[:_QUOTED],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
@@ -108,10 +108,10 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-    command = own_python(
+    command = python_command(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
+    output, status = run_python(command, json.dumps(request).encode(), patience, MOST)
     return parse_answers(output, status, library="MuJoCo", name=request["name"], patience=patience)
 
 

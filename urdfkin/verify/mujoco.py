@@ -31,7 +31,7 @@ import numpy as np
 from urdfkin.errors import OracleError
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree, Mimic
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 from urdfkin.verify.oracle import (
     WORLD,
@@ -399,7 +399,7 @@ def _with_mass_at_root(model: Any, root: str) -> Any:
 
 def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
     """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
-    robot = plain_xml(text)
+    robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()
     for element in robot.iterfind("joint"):

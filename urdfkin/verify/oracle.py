@@ -46,7 +46,7 @@ from urdfkin.errors import OracleError
 from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import KERNELS
 
 
@@ -56,7 +56,7 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         return {}
     rules = {
         name: Mimic(rule.get("joint", ""), float(rule.get("multiplier", "1")), float(rule.get("offset", "0")))
-        for joint in plain_xml(text).iterfind("joint")
+        for joint in parse_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
     return resolved_rules(rules)
@@ -629,10 +629,10 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     kernel and NumPy return identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
-    if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
+    if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:
         begin = time.thread_time()
         sums = _coupled(rows, columns, index, factor, nv)
-        preload.spend("coupling", time.thread_time() - begin)
+        preload.add_time("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
     kernel(rows, columns, index, factor, out)

@@ -27,7 +27,7 @@ import numpy as np
 from urdfkin.errors import InstallationError, OracleError, QuestionsSection
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.system.processes import with_stack
+from urdfkin.system.processes import call_with_stack
 from urdfkin.verify.oracle import (
     Oracle,
     PinocchioLayout,
@@ -152,7 +152,7 @@ def build_model(
     if depth < _SHALLOW:
         model = _parse(text, tree, root_joint, mimic)
     else:
-        model = with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
+        model = call_with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
     return _reduced(model, text, lock, coupled=coupled) if lock else model
 
 

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.oracle import resolved_rules
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def second_reading(
         robot = read(text)
     except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
         words = " ".join(str(error).split()) or "no message"
-        return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
+        return SecondReading(by, unread=escape_unprintable(f"{type(error).__name__}: {words}")[:_QUOTED])
     ours = {
         joint.name: (joint.original, tree.links[joint.parent], tree.links[i + 1])
         for i, joint in enumerate(tree.joints)
@@ -179,7 +179,7 @@ def _quaternions(text: str) -> set[str]:
         return set()
     return {
         joint.get("name", "")
-        for joint in plain_xml(text).iterfind("joint")
+        for joint in parse_xml(text).iterfind("joint")
         if (origin := joint.find("origin")) is not None and origin.get("quat_xyzw") is not None
     }
 

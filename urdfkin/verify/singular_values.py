@@ -82,7 +82,7 @@ class SingularValues(Displayable):
         rows = {3: "angular"}.get(self.rows.start, "linear" if self.rows.stop == len("xyz") else "all")
         return "" if self.columns is None else f" of {self.columns.frame}, {rows} rows"
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         title = f"Singular values{self._title()}"
         k, shape = self.values.value.shape[-1], self.values.value.shape[:-1]
         names = [f"sigma_{i + 1}" for i in range(k)]

@@ -21,7 +21,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.errors.display import Displayable, TextDocument, six_digits
+from urdfkin.errors.display import Displayable, TextDocument, format_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
@@ -104,7 +104,7 @@ class Singularity(Displayable):
     def __repr__(self) -> str:
         return f"<Singularity: rank {self.rank} of {self.full}>"
 
-    def _sheet(self) -> TextDocument:
+    def _text_document(self) -> TextDocument:
         title = f"rank {self.rank} of {self.full}"
         if not self:
             return TextDocument(f"Not singular: {title}.")
@@ -295,7 +295,7 @@ class _Explanation:
     def _null_motion(self, motion: FloatArray) -> str:
         motion = motion / motion[np.argmax(np.abs(motion))]
         parts = [
-            f"{name} {six_digits(float(x))}"
+            f"{name} {format_number(float(x))}"
             for name, x in zip(self._names, motion, strict=True)
             if abs(x) > np.sqrt(EPS)
         ]
@@ -334,7 +334,7 @@ def _basis(rows: FloatArray) -> FloatArray:
 
 
 def _vector(x: FloatArray) -> str:
-    return f"({', '.join(six_digits(value, 1e-12, 4) for value in x.tolist())})"
+    return f"({', '.join(format_number(value, 1e-12, 4) for value in x.tolist())})"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -33,9 +33,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import left_out
+from urdfkin.dh.common_normals import sum_zeroed_tilts
 from urdfkin.dh.motion import acceleration, jacobian
-from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
+from urdfkin.dh.snapping import MAX_SNAP_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
@@ -149,7 +149,7 @@ def _loss(table: DHTable) -> str:
     )
     tilts = [abs(math.sin(row.alpha)) for row in table.rows if row.alpha not in (0.0, math.pi)]
     tilt = math.asin(min(tilts, default=1.0))
-    snap = f"use --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= LARGEST_TOLERANCE else ""
+    snap = f"use --snap {10.0 ** math.ceil(math.log10(tilt)):.0e}, or " if tilt <= MAX_SNAP_TOLERANCE else ""
     return (
         f"{cell} of {joint} is {length:.3g} m, which rounds by {EPS * length * 1e3:.2g} mm;"
         f" {snap}use Hayati rows"
@@ -281,7 +281,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
-    rounding = EPS * counted + left_out(make_chain(tree, table.tip_frame, table.base_frame))
+    rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 

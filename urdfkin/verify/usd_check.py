@@ -31,8 +31,8 @@ from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.configuration import largest_value
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame, inverse, pose
-from urdfkin.system.files import at_home, read_bytes
-from urdfkin.system.processes import ask_python, own_python
+from urdfkin.system.files import expand_home, read_bytes
+from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.usd import UsdRemark, version
 from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
@@ -74,7 +74,7 @@ def read_usd(
     rejects the file or exceeds a limit, or for an unsupported joint.
     """
     version()
-    path = at_home(source)
+    path = expand_home(source)
     read_bytes(path)  # `read_bytes` raises the usual error if the file is missing.
     request = {
         "path": os.path.realpath(path),
@@ -83,10 +83,10 @@ def read_usd(
         "articulation": articulation,
         "seconds": ceil(patience) + 1,
     }
-    command = own_python(
+    command = python_command(
         "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
+    output, status = run_python(command, json.dumps(request).encode(), patience, MOST)
     answers, ending = parse_answers(output, status, library="OpenUSD", name=str(path), patience=patience)
     if not answers:
         raise InputError(

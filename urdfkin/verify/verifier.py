@@ -22,7 +22,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.configuration import draw_samples, warn_of_degrees
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.system.lazy_import import own_version
+from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.urdf.sources import Origin
 from urdfkin.verify.bounds import KERNELS, Bound, magnitudes
 from urdfkin.verify.call import Call, Part
@@ -172,7 +172,7 @@ class Verifier:
             reading="; ".join(filter(None, (self.reading, self.origin.locks_text))),
             source=self.origin.source,
             sha256=self.sha256,
-            urdfkin=own_version(),
+            urdfkin=urdfkin_version(),
         )
 
     @property
@@ -225,7 +225,7 @@ class Verifier:
         if self.cannot(None, by) is not None:
             return lambda *arguments: None
         for kernel in CHECKS:
-            preload.kernel(kernel, preload.LOADING, KERNELS)
+            preload.get_kernel(kernel, preload.LOAD_AFTER, KERNELS)
 
         def compute_and_check(*arguments: Any) -> FloatArray | None:
             result = compute(*arguments)
@@ -395,7 +395,7 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
     Jacobian on a fixed base, such a path has one bound for all configurations.
     """
     v, a = (*x.rates, None, None)[:2]
-    constant = v is None and x.state is FIXED_BASE_STATE and x.plan.turns_only and len(x.q) > 0
+    constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
     key = "bound", quantity.name, x.reference, by.name
     bound: Bound | None = x.plan.cache.get(key) if constant else None
     if bound is None:

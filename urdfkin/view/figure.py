@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import InputError
-from urdfkin.errors.escape import printable
-from urdfkin.system.lazy_import import install_remedy
-from urdfkin.system.processes import not_reading
+from urdfkin.errors.escape import escape_unprintable
+from urdfkin.system.lazy_import import install_command
+from urdfkin.system.processes import avoid_settings_file
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -71,7 +71,7 @@ def style(**more: Any) -> Any:
 
 def label(name: str) -> str:
     """Return a name for a drawing; characters that are missing in the font or illegal in XML are escaped."""
-    return printable(name)
+    return escape_unprintable(name)
 
 
 def has_matplotlib() -> bool:
@@ -82,8 +82,8 @@ def has_matplotlib() -> bool:
 def _matplotlib() -> Any:
     """Import matplotlib without the settings of a file `matplotlibrc` in the current folder."""
     if not has_matplotlib():
-        raise InputError("drawing needs matplotlib", remedy=install_remedy("plots"))
-    with not_reading("matplotlibrc"):
+        raise InputError("drawing needs matplotlib", remedy=install_command("plots"))
+    with avoid_settings_file("matplotlibrc"):
         return importlib.import_module("matplotlib")
 
 
@@ -117,7 +117,7 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     text = re.sub(r"<!--.*?-->|\n\s*", lambda found: "\n" if found[0][0] == "\n" else "", text)
     head, _, body = text.partition(">")
     size = re.search(r'viewBox="[^"]*"', head)
-    title, description = (escape(printable(words), quote=False) for words in (title, description))
+    title, description = (escape(escape_unprintable(words), quote=False) for words in (title, description))
     labels = f"<title>{title}</title><desc>{description}</desc>"
     return f'<svg class="plot" {size[0] if size else ""} role="img">{labels}{body}'
 

@@ -63,7 +63,7 @@ class Player:
     def check(self) -> None:
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
-        mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
+        mark = "! " if motion.unverified_reason is not None else "✓ " if motion.agrees else "✗ "
         self._check_line = mark + caption(motion, x)
         self._write()
 

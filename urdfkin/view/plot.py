@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.compiled.plan import IntArray
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
@@ -63,10 +63,10 @@ def _rotation(x: FrameMotion) -> FloatArray:
 
 
 def draw_parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
+    sizes = np.linalg.norm(x.breakdown.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
-    used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
-    names = tuple(KINDS[k] for k in used)
+    used = [k for k in range(len(ACCELERATION_KINDS)) if sizes[:, k].any()]
+    names = tuple(ACCELERATION_KINDS[k] for k in used)
     _draw_lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
     axes.set_ylabel("norms of the parts [m/s²]")
 
@@ -98,13 +98,13 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     eps is 2**-52. The scale is an upper bound on the sum of the absolute values of the terms of a number.
     """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
-    if x.not_verified is not None:
+    if x.unverified_reason is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
         return
     for k, (quantity, check) in enumerate(x.checks.items()):
         axes.plot(t, check.units, label=quantity, **_line_style(k))
         axes.plot(t, check.bound, linewidth=0.6, **_line_style(k))
-        outside = check.share > 1.0
+        outside = check.bound_ratio > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
@@ -270,11 +270,13 @@ def _path_text(x: FrameMotion, trajectory: Trajectory) -> str:
 
 def caption(x: FrameMotion, trajectory: Trajectory) -> str:
     """Return one line: the result of the check, and how v and a were computed."""
-    rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_VELOCITIES_UNCHECKED}")
-    if x.not_verified is not None:
-        return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"
+    rates = f"rates {trajectory.rates_source}" + (
+        ", exactly" if trajectory.exact else f"; {_VELOCITIES_UNCHECKED}"
+    )
+    if x.unverified_reason is not None:
+        return f"NOT VERIFIED by Pinocchio {version()}: {x.unverified_reason}; {rates}"
     worst = max(float(np.max(check.units, initial=0.0)) for check in x.checks.values())
-    share = max(float(np.max(check.share, initial=0.0)) for check in x.checks.values())
+    share = max(float(np.max(check.bound_ratio, initial=0.0)) for check in x.checks.values())
     verdict = "verified by" if x.agrees else "DISAGREES with"
     return (
         f"{len(trajectory.t)} samples, {verdict} Pinocchio {version()}: worst disagreement {worst:.2g}"

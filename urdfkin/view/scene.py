@@ -19,7 +19,7 @@ from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.files import read_bytes
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
 #: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown.
@@ -107,7 +107,7 @@ class Shape:
 
 def shapes(robot: Robot) -> list[Shape]:
     """Return all visuals of a robot, except malformed ones."""
-    root = plain_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
+    root = parse_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []

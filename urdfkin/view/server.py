@@ -44,8 +44,8 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy, installed_version
-from urdfkin.system.locks import lock_over_forks
+from urdfkin.system.lazy_import import install_command, installed_version
+from urdfkin.system.locks import make_fork_safe_lock
 
 
 def has_screen() -> bool:
@@ -173,7 +173,7 @@ _SCRIPTS = (
 )
 #: Start of the page's head, after which urdfkin's script is added.
 _HEAD = '<meta charset="utf-8" />'
-_serve_lock = lock_over_forks()
+_serve_lock = make_fork_safe_lock()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
@@ -192,7 +192,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     try:
         import viser
     except ImportError:
-        raise InputError("the viewer needs viser", remedy=install_remedy("view")) from None
+        raise InputError("the viewer needs viser", remedy=install_command("view")) from None
 
     class PrivateServer(viser.ViserServer):
         address: str

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.breakdown import KINDS
+from urdfkin.compiled.breakdown import ACCELERATION_KINDS
 from urdfkin.dh.table import DHConvention, DHTable
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
@@ -74,9 +74,9 @@ def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
 
     The motion `x` has one sample in LOCAL_WORLD_ALIGNED. An acceleration of at most 1e-9 m/s^2 has no arrow.
     """
-    parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
+    parts = np.vstack([x.breakdown.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
-    names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
+    names = tuple(name for name, used in zip((*ACCELERATION_KINDS, "sum"), keep, strict=True) if used)
     return _arrows(x, parts[keep], [PART_COLOURS[name] for name in names], names, reach)
 
 
@@ -248,7 +248,7 @@ class Stage:
         return [
             self._scene.add_label(
                 f"/robot/{i}/{kind}",
-                printable(word),
+                escape_unprintable(word),
                 font_screen_scale=0.7,
                 anchor="bottom-left",
                 visible=False,

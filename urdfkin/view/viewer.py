@@ -14,7 +14,7 @@ import numpy as np
 
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
-from urdfkin.errors.escape import markdown_text, printable
+from urdfkin.errors.escape import escape_unprintable, markdown_text
 from urdfkin.model.configuration import degrees_messages, parse_finite
 from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.conventions import Conversion
@@ -244,8 +244,8 @@ def describe_motion(x: FrameMotion) -> str:
 
 
 def check_line(x: FrameMotion) -> str:
-    if x.not_verified is not None:
-        return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
+    if x.unverified_reason is not None:
+        return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.unverified_reason)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
     mark = "**✓ verified** by" if x.agrees else "**✗ disagrees** with"
     return f"{mark} Pinocchio {version()}, eps·scale: {figures}"
@@ -329,7 +329,7 @@ class Viewer:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         gui.main_panel.dock_right()  # The controls do not cover the picture.
-        gui.set_panel_label(printable(robot.name))
+        gui.set_panel_label(escape_unprintable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))
         if trajectory is not None:
@@ -350,7 +350,7 @@ class Viewer:
                 gui.add_markdown(f"joints fixed by equal limits: {markdown_text(', '.join(fixed))}")
             tool = "" if self._conversion is None else f" of {self._conversion.convention.name}"
             self.words_of_q = gui.add_text(
-                printable(f"q{tool}, to copy or type"),
+                escape_unprintable(f"q{tool}, to copy or type"),
                 "",
                 hint="Write values as in --q: 0.5, 30deg, ready, ready,elbow=30deg.",
             )

@@ -36,7 +36,7 @@ from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDI
 from urdfkin.model.conventions.convention import transcode
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 
 #: Roundings of Newton's single precision, derived above.
 SINGLE = 30.0
@@ -62,7 +62,7 @@ class Library:
 
 def bare(text: str) -> str:
     """Return a URDF without meshes, in which every link has a mass and every joint has limits."""
-    root = plain_xml(text)
+    root = parse_xml(text)
     for child in list(root):
         if child.tag not in ("link", "joint"):
             root.remove(child)
@@ -104,7 +104,7 @@ def _root(robot: Robot) -> str:
 
 def mujoco(robot: Robot, folder: Path) -> Library:
     mj = pytest.importorskip("mujoco")
-    root = plain_xml(bare(robot.urdf))
+    root = parse_xml(bare(robot.urdf))
     options = {"fusestatic": "false", "boundmass": "1e-6", "boundinertia": "1e-9"}
     SubElement(SubElement(root, "mujoco"), "compiler", options)
     spec = mj.MjSpec.from_string(tostring(root, encoding="unicode"))

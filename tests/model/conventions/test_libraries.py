@@ -27,7 +27,7 @@ from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, find_con
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, VELOCITY
 
@@ -72,7 +72,7 @@ def _differences(
 
 def _farthest_mass(robot: Robot, q: FloatArray) -> float:
     """Return an upper bound of the distance of all centres of mass from the root and from their links."""
-    origins = plain_xml(robot.urdf).iterfind("link/inertial/origin")
+    origins = parse_xml(robot.urdf).iterfind("link/inertial/origin")
     masses = [[float(x) for x in origin.get("xyz", "0 0 0").split()] for origin in origins]
     places = robot.placement(q, robot.link_frames)[:, :3, 3]
     return float(np.linalg.norm(places, axis=-1).max() + np.linalg.norm(masses or [[0.0] * 3], axis=-1).max())

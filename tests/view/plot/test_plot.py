@@ -12,7 +12,7 @@ from urdfkin.cli.view import PANELS as OFFERED
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
-from urdfkin.robot.trajectory import Trajectory, line
+from urdfkin.robot.trajectory import Trajectory, make_line_trajectory
 from urdfkin.view.figure import save
 from urdfkin.view.plot import COORDINATES, PANELS, _line_style, caption, plot_motion
 
@@ -23,7 +23,7 @@ Case = tuple[Robot, FrameMotion, Trajectory]
 @pytest.fixture(scope="module")
 def case() -> Case:
     robot = urdfkin.load("panda")
-    x = line(robot, robot.sample(1, 1)[0], robot.sample(1, 2)[0], 1.0, 21)
+    x = make_line_trajectory(robot, robot.sample(1, 1)[0], robot.sample(1, 2)[0], 1.0, 21)
     return robot, frame_motion(robot, x, robot.tip_frame), x
 
 
@@ -75,7 +75,7 @@ def _of(bounds: Any) -> tuple[set[float], set[float]]:
 @pytest.mark.slow
 def test_long_legends_do_not_make_the_panels_narrower() -> None:
     robot = urdfkin.load("a1", root_joint="floating")
-    x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
+    x = make_line_trajectory(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     figure = plot_motion(robot, frame_motion(robot, x, "FL_foot"), x)
     figure.draw_without_rendering()
     assert min(axes.get_position().width for axes in figure.axes) > 0.72 / 3
@@ -90,7 +90,7 @@ def test_the_legend_names_joints_outside_the_limits_and_counts_the_others() -> N
     end = np.clip(robot.sample(1, 3)[0], *robot.limits)
     far = [robot.coordinate_names.index(name) for name in ("LElbowYaw", "RWristPitch")]
     end[far] = robot.limits[1, far] + 0.5
-    x = line(robot, robot.neutral(), end, 1.0, 11)
+    x = make_line_trajectory(robot, robot.neutral(), end, 1.0, 11)
     (axes, *_) = plot_motion(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     legend = axes.get_legend()
     assert legend is not None
@@ -113,7 +113,7 @@ def test_a_plot_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case
 
 def test_crosses_mark_limit_violations_and_disagreements_are_plotted_with_the_bound(case: Case) -> None:
     robot, motion, trajectory = case
-    x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
+    x = make_line_trajectory(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
     (axes, _) = plot_motion(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
     outside = x.q[:, 3] > robot.limits[1, 3]
@@ -122,7 +122,7 @@ def test_crosses_mark_limit_violations_and_disagreements_are_plotted_with_the_bo
     (bounded,) = plot_motion(robot, motion, trajectory, ["disagreement"]).axes
     for check in motion.checks.values():
         assert (check.bound > 0.0).all()
-        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
+        np.testing.assert_allclose(check.units, check.bound_ratio * check.bound, rtol=1e-12)
         assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in bounded.lines)
     assert bounded.get_ylim()[1] > max(check.bound.max() for check in motion.checks.values())
 
@@ -143,7 +143,7 @@ def test_no_axis_of_a_plot_mixes_metres_and_radians(case: Case) -> None:
 @pytest.mark.slow
 def test_a_floating_base_is_plotted_with_position_and_quaternion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
-    x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
+    x = make_line_trajectory(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     motion = frame_motion(robot, x, "FL_foot")
     assert motion.agrees
     *axes, _ = plot_motion(robot, motion, x, ["q", "v"]).axes

@@ -12,9 +12,9 @@ from __future__ import annotations
 import os
 import sys
 
-from urdfkin.system.processes import not_reading
+from urdfkin.system.processes import avoid_settings_file
 
 if "numba" not in sys.modules:
-    with not_reading(".numba_config.yaml"):
+    with avoid_settings_file(".numba_config.yaml"):
         from numba.core import config
     config._config_fname = os.devnull

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from urdfkin.compiled.machine.compiling import compiled
+from urdfkin.compiled.machine.compiling import inline
 from urdfkin.kinematics.arithmetic import bind_equations
 
-globals().update(vars(bind_equations(decorate=compiled)))
+globals().update(vars(bind_equations(decorate=inline)))
 
 
 def __getattr__(name: str) -> Any:

@@ -29,16 +29,16 @@ from numba.core.compiler import CompilerBase, CompileResult
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.serialize import dumps
 
-from urdfkin.compiled.kernel_cache import cache_folder, compile_event, compiling
-from urdfkin.system.cache import get, put, report_damaged
+from urdfkin.compiled.kernel_cache import compile_event, compile_lock, kernel_cache_folder
+from urdfkin.system.cache import read_cached_file, report_damaged, write_cached_file
 from urdfkin.system.files import read_bytes
 
-_Null: Any = NullCache  # Numba has no type annotations.
+_NullCache: Any = NullCache  # Numba has no type annotations.
 _Result: Any = CompileResult
 _dumps: Any = dumps
 
 
-class KernelCache(_Null):  # type: ignore[misc]
+class KernelCache(_NullCache):  # type: ignore[misc]
     """The disk cache of one function, which Numba reads before a compilation and writes afterwards.
 
     A function's source file may be in another package. The name of the cache file therefore depends on the
@@ -51,22 +51,22 @@ class KernelCache(_Null):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        place = self._place(sig, target_context.codegen())
-        if (content := get(place)) is not None:
+        path = self._path(sig, target_context.codegen())
+        if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
             # An undamaged file may come from another version of Numba; reading it can cause any error.
             except Exception as error:
-                report_damaged(place, f"{type(error).__name__}: {error}")
+                report_damaged(path, f"{type(error).__name__}: {error}")
         self._begin()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         # Code with dynamic globals contains addresses of this process, so it cannot be cached.
         if not cres.library.has_dynamic_globals:
-            put(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
+            write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
-    def _place(self, signature: Any, codegen: Any) -> Path:
+    def _path(self, signature: Any, codegen: Any) -> Path:
         key = repr((signature, codegen.magic_tuple(), self._source))
         return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}.kernel"
 
@@ -89,7 +89,7 @@ class _InlinedLibrary(_Library):  # type: ignore[misc]
         self._finalized = True
 
     @property
-    def all(self) -> list[Any]:
+    def all_libraries(self) -> list[Any]:
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -103,9 +103,11 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.flags.no_compile = True
         super().run_pass(state)
         # Numba uses a Python function as the key of a compiled function, and never calls this function.
-        what, environment = state.cr.fndesc, state.cr.env
-        handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
-        state.targetctx.insert_user_function(handle, what, state.library.all)
+        descriptor, environment = state.cr.fndesc, state.cr.env
+        handle = make_function(
+            descriptor.lookup_module(), descriptor.qualname, "", 0, environment, (state.library,)
+        )
+        state.targetctx.insert_user_function(handle, descriptor, state.library.all_libraries)
         state.cr = state.cr._replace(cfunc=handle)
         return True
 
@@ -180,7 +182,7 @@ def _skip_blas_check() -> None:
             linalg.ensure_blas = before
 
 
-def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def jit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
             return numba.njit(**options, **COMPILED)(function)
@@ -188,22 +190,22 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-compiled = jitted(**_INLINED)
+inline = jit(**_INLINED)
 
 # A read-only argument type also accepts a writable array, without a copy.
-NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
-ROWS = types.Array(types.float64, 2, "C", readonly=True)
-PLACES = types.Array(types.int64, 1, "C", readonly=True)
-TABLE = types.Array(types.int64, 2, "C", readonly=True)
-SCRATCH = types.Array(types.float64, 1, "C")
-WHOLE = types.Array(types.int64, 1, "C")
-STATES = types.Array(types.float64, 3, "C")
+FLOATS_1D = types.Array(types.float64, 1, "C", readonly=True)
+FLOATS_2D = types.Array(types.float64, 2, "C", readonly=True)
+INTS_1D = types.Array(types.int64, 1, "C", readonly=True)
+INTS_2D = types.Array(types.int64, 2, "C", readonly=True)
+WRITABLE_FLOATS_1D = types.Array(types.float64, 1, "C")
+WRITABLE_INTS_1D = types.Array(types.int64, 1, "C")
+WRITABLE_FLOATS_3D = types.Array(types.float64, 3, "C")
 
 
 class Kernel:
     """A function that is compiled, or read from disk, when it is first called."""
 
-    compiled: Any
+    compiled_function: Any
 
     def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...]) -> None:
         self._function, self._arguments = function, arguments
@@ -211,15 +213,15 @@ class Kernel:
 
     def __getattr__(self, name: str) -> Any:
         # No `cached_property` is used, because before Python 3.12 its lock could stay locked after a fork.
-        if name != "compiled":
+        if name != "compiled_function":
             raise AttributeError(name)
-        with compiling:
-            if "compiled" not in self.__dict__:
-                self.compiled = self._compile()
-            return self.__dict__["compiled"]
+        with compile_lock:
+            if "compiled_function" not in self.__dict__:
+                self.compiled_function = self._compile()
+            return self.__dict__["compiled_function"]
 
     def _compile(self) -> Any:
-        dispatcher = jitted(nogil=True)(self._function)
+        dispatcher = jit(nogil=True)(self._function)
         self._compile_or_load(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
         dispatcher.disable_compile()
         return dispatcher
@@ -227,17 +229,17 @@ class Kernel:
     def _compile_or_load(self, function: Any, compile_: Callable[[], object]) -> None:
         with compile_event(self.__name__.strip("_").replace("_", " ")) as begin, compiling_allowed():
             _skip_blas_check()
-            if (folder := cache_folder()) is None:
+            if (folder := kernel_cache_folder()) is None:
                 begin()
             else:
                 function._cache = KernelCache(self._function, folder, begin)
             compile_()
 
     def __call__(self, *arguments: Any) -> int:
-        return int(self.compiled(*arguments))
+        return int(self.compiled_function(*arguments))
 
 
-class Core(Kernel):
+class CKernel(Kernel):
     """A compiled function with integer arguments that C code can call.
 
     A call from Python releases the global interpreter lock, because the call uses ctypes.
@@ -247,20 +249,20 @@ class Core(Kernel):
         super().__init__(function, (types.int64,) * function.__code__.co_argcount)
 
     def _compile(self) -> Any:
-        core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
-        self._compile_or_load(core, core.compile)
-        return core
+        c_function: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
+        self._compile_or_load(c_function, c_function.compile)
+        return c_function
 
     @property
     def address(self) -> int:
-        return int(self.compiled.address)
+        return int(self.compiled_function.address)
 
     def __call__(self, *arguments: Any) -> int:
-        return int(self.compiled.ctypes(*arguments))
+        return int(self.compiled_function.ctypes(*arguments))
 
 
-def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    return jitted(**_INLINED, **options)
+def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    return jit(**_INLINED, **options)
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:

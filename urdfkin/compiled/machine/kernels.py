@@ -10,15 +10,15 @@ from typing import Any
 
 from urdfkin.compiled import outputs, recursion, recursions
 from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
-from urdfkin.compiled.machine.compiling import Core, compiled
+from urdfkin.compiled.machine.compiling import CKernel, inline
 from urdfkin.kinematics.arithmetic import rebind_functions
 
 #: In the compiled copies, these objects replace the Python objects that have the same names.
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
-_INLINED: dict[str, Any] = rebind_functions(recursion, outputs, decorate=compiled, replacements=_OTHERS)
-_KERNELS: dict[str, Core] = rebind_functions(recursions, decorate=Core, replacements=_INLINED)
+_INLINED: dict[str, Any] = rebind_functions(recursion, outputs, decorate=inline, replacements=_OTHERS)
+_KERNELS: dict[str, CKernel] = rebind_functions(recursions, decorate=CKernel, replacements=_INLINED)
 
 placements, velocities, accelerations = (
     _KERNELS[name] for name in ("placements", "velocities", "accelerations")

@@ -15,71 +15,73 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled.machine.compiling import compiled
-from urdfkin.compiled.machine.numbers import NOTHING, Known, Lanes, as_number, in_all_lanes
+from urdfkin.compiled.machine.compiling import inline
+from urdfkin.compiled.machine.numbers import UNUSED, ConstantNumber, Lanes, as_number, build_broadcast
 from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import LARGE
 
-NUMBER = Lanes(LANES)
-NUMBERS, WHOLE_NUMBERS = types.CPointer(types.float64), types.CPointer(types.int64)
+LANES_TYPE = Lanes(LANES)
+DOUBLES, INTEGERS = types.CPointer(types.float64), types.CPointer(types.int64)
 
 
-def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
+def _vector_pointer(builder: Any, numbers: Any, at: Any, width: int) -> Any:
     return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
 
 
-def _in_row(builder: Any, s: Any, row: Any) -> Any:
-    return _vector_at(builder, s, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
+def _row_pointer(builder: Any, s: Any, row: Any) -> Any:
+    return _vector_pointer(builder, s, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
 
 
 @intrinsic
-def number(context: Any, s: Any, row: Any) -> Any:
+def load_number(context: Any, s: Any, row: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.load(_in_row(builder, *arguments), align=64)
+        return builder.load(_row_pointer(builder, *arguments), align=64)
 
-    return NUMBER(NUMBERS, types.intp), generate
+    return LANES_TYPE(DOUBLES, types.intp), generate
 
 
 @intrinsic
-def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
+def load_number_if(context: Any, marker: Any, s: Any, row: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        if isinstance(wanted, Known):
+        if isinstance(marker, ConstantNumber):
             return context.get_dummy_value()
-        return builder.load(_in_row(builder, *arguments[1:]), align=64)
+        return builder.load(_row_pointer(builder, *arguments[1:]), align=64)
 
-    return (NOTHING if isinstance(wanted, Known) else NUMBER)(wanted, NUMBERS, types.intp), generate
+    return (UNUSED if isinstance(marker, ConstantNumber) else LANES_TYPE)(
+        marker, DOUBLES, types.intp
+    ), generate
 
 
 @intrinsic
-def put(context: Any, s: Any, row: Any, x: Any) -> Any:
+def store_number(context: Any, s: Any, row: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
-        if x != NOTHING:
+        if x != UNUSED:
             vector = as_number(context, builder, x, value, LANES)
-            builder.store(vector, _in_row(builder, s, row), align=64)
+            builder.store(vector, _row_pointer(builder, s, row), align=64)
         return context.get_dummy_value()
 
-    return types.void(NUMBERS, types.intp, x), generate
+    return types.void(DOUBLES, types.intp, x), generate
 
 
 @intrinsic
-def constant(context: Any, g: Any, i: Any) -> Any:
+def load_constant(context: Any, g: Any, i: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
+        return build_broadcast(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
 
-    return NUMBER(NUMBERS, types.intp), generate
+    return LANES_TYPE(DOUBLES, types.intp), generate
 
 
 @intrinsic
-def same(context: Any, x: Any) -> Any:
+def broadcast(context: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return in_all_lanes(builder, arguments[0], LANES)
+        return build_broadcast(builder, arguments[0], LANES)
 
-    return NUMBER(types.float64), generate
+    return LANES_TYPE(types.float64), generate
 
 
 @intrinsic
-def numbers_of(context: Any, array: Any) -> Any:
+def array_data(context: Any, array: Any) -> Any:
     """Return a pointer to an array's numbers; an index into the pointer must not be negative."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -88,26 +90,26 @@ def numbers_of(context: Any, array: Any) -> Any:
     return types.CPointer(array.dtype)(array), generate
 
 
-def _at_address(kind: Any) -> Any:
+def _make_pointer_function(kind: Any) -> Any:
     @intrinsic
-    def at_address(context: Any, address: Any) -> Any:
+    def pointer_at(context: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
         return kind(types.int64), generate
 
-    return at_address
+    return pointer_at
 
 
 #: Functions that convert an address to a pointer to doubles, and to a pointer to integers.
-numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
+doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
 #: Maximum number of doubles that are prefetched; they fill half of the first-level cache.
-_MOST_FETCHED = 3072
+_MAX_PREFETCHED = 3072
 
 
-def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
+def _slice_vector(builder: Any, vector: Any, start: int, width: int) -> Any:
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 
@@ -139,7 +141,7 @@ def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     return x
 
 
-def _plus(builder: Any, number: Any, constant: int) -> Any:
+def _add_constant(builder: Any, number: Any, constant: int) -> Any:
     return builder.add(number, ir.Constant(number.type, constant))
 
 
@@ -152,14 +154,14 @@ def _make_reader(width: int) -> Any:
             x, at, stride, s, row = arguments
             pieces = []
             for _ in range(LANES):
-                pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
+                pieces.append(builder.load(_vector_pointer(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
             rows = _transpose_blocks(builder, [_concatenate(builder, pieces[i::width]) for i in range(width)])
             for i, vector in enumerate(rows):
-                builder.store(vector, _in_row(builder, s, _plus(builder, row, i)), align=64)
+                builder.store(vector, _row_pointer(builder, s, _add_constant(builder, row, i)), align=64)
             return context.get_dummy_value()
 
-        return types.void(NUMBERS, *[types.intp] * 2, NUMBERS, types.intp), generate
+        return types.void(DOUBLES, *[types.intp] * 2, DOUBLES, types.intp), generate
 
     return read
 
@@ -173,16 +175,16 @@ def _make_writer(width: int) -> Any:
             s, rows, first, to, at, stride = arguments
             vectors = []
             for i in range(width):
-                row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
-                vectors.append(builder.load(_in_row(builder, s, row), align=64))
+                row = builder.load(builder.gep(rows, [_add_constant(builder, first, i)]))
+                vectors.append(builder.load(_row_pointer(builder, s, row), align=64))
             blocks = _transpose_blocks(builder, vectors)
             for k in range(LANES):
-                numbers = _piece(builder, blocks[k % width], k // width * width, width)
-                builder.store(numbers, _vector_at(builder, to, at, width), align=8)
+                numbers = _slice_vector(builder, blocks[k % width], k // width * width, width)
+                builder.store(numbers, _vector_pointer(builder, to, at, width), align=8)
                 at = builder.add(at, stride)
             return context.get_dummy_value()
 
-        return types.void(NUMBERS, WHOLE_NUMBERS, types.intp, NUMBERS, *[types.intp] * 2), generate
+        return types.void(DOUBLES, INTEGERS, types.intp, DOUBLES, *[types.intp] * 2), generate
 
     return write
 
@@ -191,7 +193,7 @@ _read_8, _read_4, _read_2, _read_1 = map(_make_reader, (8, 4, 2, 1))
 _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 
-@compiled
+@inline
 def read_rows(m, x, at, stride, count, s, row):
     """Read `count` numbers of each of eight configurations into rows of scratch memory.
 
@@ -201,7 +203,7 @@ def read_rows(m, x, at, stride, count, s, row):
     i = 0
     if m == 1:
         for i in range(count):
-            put(s, row + i, same(x[at + i]))
+            store_number(s, row + i, broadcast(x[at + i]))
     else:
         while i + 8 <= count:
             _read_8(x, at + i, stride, s, row + i)
@@ -216,7 +218,7 @@ def read_rows(m, x, at, stride, count, s, row):
             _read_1(x, at + i, stride, s, row + i)
 
 
-@compiled
+@inline
 def write_rows(m, s, rows, first, count, to, at, stride):
     """Write `count` scratch rows to the array `to`; if `m` is 1, write only one configuration."""
     i = 0
@@ -238,7 +240,7 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 
 @intrinsic
-def _fetch(context: Any, x: Any, at: Any) -> Any:
+def _prefetch(context: Any, x: Any, at: Any) -> Any:
     """Load the memory around `x[at]` into the cache; an address beyond the array is harmless."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -250,37 +252,37 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
         builder.call(function, [address, to_read, near, data])
         return context.get_dummy_value()
 
-    return types.void(NUMBERS, types.intp), generate
+    return types.void(DOUBLES, types.intp), generate
 
 
-@compiled
-def fetch(x, at, count):
-    if count <= _MOST_FETCHED:
+@inline
+def prefetch(x, at, count):
+    if count <= _MAX_PREFETCHED:
         for number in range(at, at + count, LANES):
-            _fetch(x, number)
+            _prefetch(x, number)
 
 
 #: Prefetch distance: number of doubles between the number that is read and the number that is prefetched.
-_AHEAD = 512
+_PREFETCH_DISTANCE = 512
 
 
 @intrinsic
-def _eight(context: Any, x: Any, at: Any) -> Any:
+def _load_eight(context: Any, x: Any, at: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, at = arguments
-        return builder.load(_vector_at(builder, x, at, LANES), align=8)
+        return builder.load(_vector_pointer(builder, x, at, LANES), align=8)
 
-    return NUMBER(NUMBERS, types.intp), generate
+    return LANES_TYPE(DOUBLES, types.intp), generate
 
 
-@compiled
-def _plus_squares(total, x, at):
-    _fetch(x, at + _AHEAD)
-    eight = _eight(x, at)
+@inline
+def _add_eight_squares(total, x, at):
+    _prefetch(x, at + _PREFETCH_DISTANCE)
+    eight = _load_eight(x, at)
     return total + eight * eight
 
 
-@compiled
+@inline
 def add_squares(total, x, at, count):
     """Add to `total` the squares of `count` numbers that begin at `x[at]`.
 
@@ -288,22 +290,25 @@ def add_squares(total, x, at, count):
     harmless, because the sum is only compared with a very large bound.
     """
     # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
-    second, third, fourth = same(0.0), same(0.0), same(0.0)
+    second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
     end = at + count
     while at + 4 * LANES <= end:
-        total, second = _plus_squares(total, x, at), _plus_squares(second, x, at + LANES)
-        third, fourth = _plus_squares(third, x, at + 2 * LANES), _plus_squares(fourth, x, at + 3 * LANES)
+        total, second = _add_eight_squares(total, x, at), _add_eight_squares(second, x, at + LANES)
+        third, fourth = (
+            _add_eight_squares(third, x, at + 2 * LANES),
+            _add_eight_squares(fourth, x, at + 3 * LANES),
+        )
         at += 4 * LANES
     while at + LANES <= end:
-        total = _plus_squares(total, x, at)
+        total = _add_eight_squares(total, x, at)
         at += LANES
     for i in range(at, end):
-        total = total + same(x[i]) * same(x[i])
+        total = total + broadcast(x[i]) * broadcast(x[i])
     return (total + second) + (third + fourth)
 
 
 @intrinsic
-def _sum(context: Any, x: Any) -> Any:
+def _sum_lanes(context: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         lanes = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(LANES)]
         return reduce(builder.fadd, lanes)
@@ -311,9 +316,9 @@ def _sum(context: Any, x: Any) -> Any:
     return types.float64(x), generate
 
 
-@compiled
-def ordinary(total):
-    return _sum(total) < LARGE * LARGE
+@inline
+def is_in_range(total):
+    return _sum_lanes(total) < LARGE * LARGE
 
 
 @intrinsic
@@ -322,15 +327,15 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
-        line = builder.load(_vector_at(builder, x, i, LANES), align=8)
-        store = builder.store(line, _vector_at(builder, to, at, LANES), align=64)
+        line = builder.load(_vector_pointer(builder, x, i, LANES), align=8)
+        store = builder.store(line, _vector_pointer(builder, to, at, LANES), align=64)
         store.set_metadata("nontemporal", builder.module.add_metadata([ir.IntType(32)(1)]))
         return context.get_dummy_value()
 
-    return types.void(NUMBERS, types.intp, NUMBERS, types.intp), generate
+    return types.void(DOUBLES, types.intp, DOUBLES, types.intp), generate
 
 
-@compiled
+@inline
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
@@ -348,7 +353,7 @@ def stream(x, count, to, at, address):
 
 
 @intrinsic
-def all_written(context: Any) -> Any:
+def wait_for_writes(context: Any) -> Any:
     """Wait until the copied cache lines are in memory, so that other processors can read them."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

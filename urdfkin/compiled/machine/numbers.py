@@ -6,8 +6,8 @@ needed. In the sum x y + z, the product and the sum are one fused multiply-add, 
 This module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)`
 are therefore exactly the same doubles, on every machine.
 
-`zero()` and `one()` are the numbers 0 and 1, known at compile time. `nothing()` is the placeholder for a
-number that is not needed; each operation with `nothing()` gives `nothing()`. Operations with these constants
+`zero()` and `one()` are the numbers 0 and 1, known at compile time. `unused()` is the placeholder for a
+number that is not needed; each operation with `unused()` gives `unused()`. Operations with these constants
 are simplified at compile time.
 """
 
@@ -51,15 +51,15 @@ class Product(types.Type):
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 
-class Known(types.Type):
-    """The type of a compile-time constant: 0, 1, or None for the placeholder `nothing()`."""
+class ConstantNumber(types.Type):
+    """The type of a compile-time constant: 0, 1, or None for the placeholder `unused()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
-        super().__init__(name=f"Known({value})")
+        super().__init__(name=f"ConstantNumber({value})")
 
 
-ZERO, ONE, NOTHING = Known(0), Known(1), Known(None)
+ZERO, ONE, UNUSED = ConstantNumber(0), ConstantNumber(1), ConstantNumber(None)
 
 
 @register_model(Lanes)
@@ -75,8 +75,8 @@ class _ProductModel(models.StructModel):
         super().__init__(dmm, fe_type, [("x", number), ("y", number)])
 
 
-@register_model(Known)
-class _KnownModel(models.OpaqueModel):
+@register_model(ConstantNumber)
+class _ConstantNumberModel(models.OpaqueModel):
     pass
 
 
@@ -101,21 +101,21 @@ class _Value:
     def number(self, width: int) -> Any:
         if self.is_product:
             return self.builder.fmul(*self.factors())
-        if isinstance(self.type, Known):
+        if isinstance(self.type, ConstantNumber):
             return ir.Constant(ir.VectorType(_DOUBLE, width), [float(self.type.value or 0)] * width)
         if isinstance(self.type, types.Integer):
-            return in_all_lanes(self.builder, self.builder.sitofp(self.value, _DOUBLE), width)
+            return build_broadcast(self.builder, self.builder.sitofp(self.value, _DOUBLE), width)
         return self.value
 
 
-def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
+def build_broadcast(builder: Any, double: Any, width: int) -> Any:
     empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
     return builder.shuffle_vector(first, empty, mask)
 
 
-def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
+def build_fma(builder: Any, x: Any, y: Any, z: Any) -> Any:
     function = builder.module.globals.get(name := f"llvm.fma.v{x.type.count}f64")
     if function is None:
         function = ir.Function(builder.module, ir.FunctionType(x.type, [x.type] * 3), name)
@@ -126,47 +126,47 @@ def _width(*kinds: Any) -> int | None:
     return next((kind.width for kind in kinds if isinstance(kind, Lanes | Product)), None)
 
 
-def _known(kind: Any, value: int | None) -> bool:
-    return isinstance(kind, Known) and kind.value == value
+def _is_constant(kind: Any, value: int | None) -> bool:
+    return isinstance(kind, ConstantNumber) and kind.value == value
 
 
-def _ours(*kinds: Any) -> bool:
+def _are_supported(*kinds: Any) -> bool:
     """Return whether all types are integers or types of this module, and at least one is of this module."""
-    ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
+    ours = [isinstance(kind, Lanes | Product | ConstantNumber) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
     )
 
 
 def _times(x: Any, y: Any) -> Any:
-    if _known(x, None) or _known(y, None):
-        return NOTHING
-    if _known(x, 0) or _known(y, 0):
+    if _is_constant(x, None) or _is_constant(y, None):
+        return UNUSED
+    if _is_constant(x, 0) or _is_constant(y, 0):
         return ZERO
-    if _known(x, 1):
+    if _is_constant(x, 1):
         return y
-    if _known(y, 1):
+    if _is_constant(y, 1):
         return x
     return Product(_width(x, y) or 1)
 
 
 def _sum(x: Any, y: Any) -> Any:
-    if _known(x, None) or _known(y, None):
-        return NOTHING
-    if _known(y, 0):
+    if _is_constant(x, None) or _is_constant(y, None):
+        return UNUSED
+    if _is_constant(y, 0):
         return x
-    if _known(x, 0):
+    if _is_constant(x, 0):
         return y
     width = _width(x, y)
     return None if width is None else Lanes(width)
 
 
 def _difference(x: Any, y: Any) -> Any:
-    return _negative(y) if _known(x, 0) and not _known(y, None) else _sum(x, y)
+    return _negative(y) if _is_constant(x, 0) and not _is_constant(y, None) else _sum(x, y)
 
 
 def _negative(x: Any) -> Any:
-    return None if _known(x, 1) else x
+    return None if _is_constant(x, 1) else x
 
 
 _RESULTS: dict[Any, Callable[..., Any]] = {
@@ -181,7 +181,7 @@ def _register_types(operation: Any, result: Callable[..., Any]) -> None:
     @infer_global(operation)
     class _Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if not args or not _ours(*args):
+            if not args or not _are_supported(*args):
                 return None
             kind = result(*args)
             return None if kind is None else signature(kind, *args)
@@ -204,22 +204,22 @@ def _product(context: Any, builder: Any, kind: Product, x: Any, y: Any) -> Any:
 def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     x, y = _values(context, builder, signature, arguments)
     kind = signature.return_type
-    if isinstance(kind, Known):
+    if isinstance(kind, ConstantNumber):
         return context.get_dummy_value()
-    if isinstance(x.type, Known):
+    if isinstance(x.type, ConstantNumber):
         return y.value
-    if isinstance(y.type, Known):
+    if isinstance(y.type, ConstantNumber):
         return x.value
     return _product(context, builder, kind, x.number(kind.width), y.number(kind.width))
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number, which must not be `nothing()`, as an LLVM vector."""
+    """Return a number, which must not be `unused()`, as an LLVM vector."""
     return _Value(context, builder, kind, value).number(width)
 
 
 def _negate(context: Any, builder: Any, x: _Value) -> Any:
-    if isinstance(x.type, Known):
+    if isinstance(x.type, ConstantNumber):
         return context.get_dummy_value()
     if x.is_product:
         first, second = x.factors()
@@ -231,23 +231,23 @@ def _lower_sum(*, negative: bool) -> Callable[..., Any]:
     """Return the function that generates the code for x + y, or for x - y if `negative` is true."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        def signed(value: Any) -> Any:
+        def apply_sign(value: Any) -> Any:
             return builder.fneg(value) if negative else value
 
         x, y = _values(context, builder, signature, arguments)
-        if _known(signature.return_type, None):
+        if _is_constant(signature.return_type, None):
             return context.get_dummy_value()
-        if _known(y.type, 0):
+        if _is_constant(y.type, 0):
             return x.value
-        if _known(x.type, 0):
+        if _is_constant(x.type, 0):
             return _negate(context, builder, y) if negative else y.value
         width = signature.return_type.width
         if y.is_product:
             first, second = y.factors()
-            return fused(builder, signed(first), second, x.number(width))
+            return build_fma(builder, apply_sign(first), second, x.number(width))
         if x.is_product:
-            return fused(builder, *x.factors(), signed(y.number(width)))
-        return builder.fadd(x.number(width), signed(y.number(width)))
+            return build_fma(builder, *x.factors(), apply_sign(y.number(width)))
+        return builder.fadd(x.number(width), apply_sign(y.number(width)))
 
     return lower
 
@@ -257,7 +257,7 @@ def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     return _negate(context, builder, x)
 
 
-_KINDS = (Lanes, Product, Known, types.Integer)
+_KINDS = (Lanes, Product, ConstantNumber, types.Integer)
 for _x in _KINDS:
     for _y in _KINDS:
         if _x is _y is types.Integer:
@@ -265,7 +265,7 @@ for _x in _KINDS:
         lower_builtin(operator.mul, _x, _y)(_lower_mul)
         lower_builtin(operator.add, _x, _y)(_lower_sum(negative=False))
         lower_builtin(operator.sub, _x, _y)(_lower_sum(negative=True))
-for _x in (Lanes, Product, Known):
+for _x in (Lanes, Product, ConstantNumber):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
@@ -276,19 +276,19 @@ def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) ->
 lower_cast(Product, Lanes)(_multiply)
 
 
-def _known_number(kind: Known) -> Any:
+def _make_constant(kind: ConstantNumber) -> Any:
     @intrinsic
-    def known(context: Any) -> Any:
+    def make_number(context: Any) -> Any:
         return kind(), lambda context, builder, signature, arguments: context.get_dummy_value()
 
-    return known
+    return make_number
 
 
-zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
+zero, one, unused = map(_make_constant, (ZERO, ONE, UNUSED))
 
 
 @intrinsic
-def rounded(context: Any, x: Any) -> Any:
+def round_product(context: Any, x: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if not isinstance(x, Product):
             return arguments[0]

@@ -18,30 +18,30 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from urdfkin.compiled.machine.compiling import compiled
-from urdfkin.compiled.machine.memory import put
-from urdfkin.compiled.machine.numbers import fused
+from urdfkin.compiled.machine.compiling import inline
+from urdfkin.compiled.machine.memory import store_number
+from urdfkin.compiled.machine.numbers import build_fma
 from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import COSINE, LARGEST_ANGLE, NO_FRACTION, PI_2, PI_2_REST, SINE
 
 _2_PI = 2.0 / math.pi
 
 
-@compiled
+@inline
 def sine_cosine(s, row, x):
     """Return the sines and the cosines of angles; the scratch memory row `row` may be overwritten."""
-    sine, cosine = _of_small(x)
+    sine, cosine = _small_sine_cosine(x)
     if _any_large(x):
-        put(s, row, x)
+        store_number(s, row, x)
         for k in range(row * LANES, (row + 1) * LANES):
             if not abs(s[k]) < LARGEST_ANGLE:
-                sine = _with_lane(sine, k - row * LANES, math.sin(s[k]))
-                cosine = _with_lane(cosine, k - row * LANES, math.cos(s[k]))
+                sine = _insert_lane(sine, k - row * LANES, math.sin(s[k]))
+                cosine = _insert_lane(cosine, k - row * LANES, math.cos(s[k]))
     return sine, cosine
 
 
 @intrinsic
-def _of_small(context: Any, x: Any) -> Any:
+def _small_sine_cosine(context: Any, x: Any) -> Any:
     """Return the sines and cosines of angles below 2^20 quarter turns, without a branch."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -58,34 +58,35 @@ def _of_small(context: Any, x: Any) -> Any:
         def polynomial(z: Any, coefficients: tuple[float, ...]) -> Any:
             value = all_lanes(coefficients[-1])
             for coefficient in coefficients[-2::-1]:
-                value = fused(builder, z, value, all_lanes(coefficient))
+                value = build_fma(builder, z, value, all_lanes(coefficient))
             return value
 
-        shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
+        shifted = build_fma(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
         # Let d be the double nearest to pi/2. If n is not 0, x and n d are multiples of 2^-53.
         # The difference x - n d is then exact, because x and n d differ by less than 1.
         # If n is 0, the difference is x.
-        # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
-        near = fused(builder, n, all_lanes(-PI_2), x)
-        r = fused(builder, n, all_lanes(-PI_2_REST), near)
-        lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
+        # The variable `r_error` is the rounding error of r, and `z_error` is the rounding error of z = r^2.
+        near = build_fma(builder, n, all_lanes(-PI_2), x)
+        r = build_fma(builder, n, all_lanes(-PI_2_REST), near)
+        r_error = build_fma(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
-        z_lost = fused(builder, r, r, builder.fneg(z))
-        # The variable `most` is 1 - z/2, which begins the cosine's series; `most_lost` is its error.
-        most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
-        most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
-        # To first order, sin(r + lost) = sin r + lost cos r and cos(r + lost) = cos r - lost sin r.
+        z_error = build_fma(builder, r, r, builder.fneg(z))
+        # The variable `leading` is 1 - z/2, which begins the cosine's series; `leading_error` is its error.
+        leading = build_fma(builder, z, all_lanes(-0.5), all_lanes(1.0))
+        leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
+        # To first order, sin(r + r_error) = sin r + r_error cos r.
+        # Similarly, cos(r + r_error) = cos r - r_error sin r.
         # The largest term is added last, because the other terms and their rounding errors are small.
-        sine = fused(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(lost, most))
+        sine = build_fma(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(r_error, leading))
         sine = builder.fadd(r, sine)
-        rest = fused(builder, builder.fmul(z, z), polynomial(z, COSINE), most_lost)
-        rest = fused(builder, z_lost, all_lanes(-0.5), rest)
-        rest = fused(builder, builder.fneg(r), lost, rest)
-        cosine = builder.fadd(most, rest)
+        rest = build_fma(builder, builder.fmul(z, z), polynomial(z, COSINE), leading_error)
+        rest = build_fma(builder, z_error, all_lanes(-0.5), rest)
+        rest = build_fma(builder, builder.fneg(r), r_error, rest)
+        cosine = builder.fadd(leading, rest)
 
-        def signed(value: Any, turns: Any) -> Any:
+        def apply_sign(value: Any, turns: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
@@ -93,8 +94,8 @@ def _of_small(context: Any, x: Any) -> Any:
         # The sine changes its sign if the quarter turns modulo 4 are 2 or 3, and the cosine if 1 or 2.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
-            signed(builder.select(odd, cosine, sine), quarters),
-            signed(builder.select(odd, sine, cosine), builder.add(quarters, bits(1))),
+            apply_sign(builder.select(odd, cosine, sine), quarters),
+            apply_sign(builder.select(odd, sine, cosine), builder.add(quarters, bits(1))),
         )
         return context.make_tuple(builder, signature.return_type, pair)
 
@@ -119,7 +120,7 @@ def _any_large(context: Any, x: Any) -> Any:
 
 
 @intrinsic
-def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
+def _insert_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments
         return builder.insert_element(x, value, lane)

@@ -24,27 +24,40 @@ from numba import types
 from numba.extending import intrinsic
 
 from urdfkin.compiled.machine import kernels
-from urdfkin.compiled.machine.compiling import Core, compiled
-from urdfkin.compiled.machine.memory import WHOLE_NUMBERS, whole_numbers_at
-from urdfkin.compiled.plan import REFERENCES, CompiledTree, IntArray, KernelArgs, program_of, scratch
+from urdfkin.compiled.machine.compiling import CKernel, inline
+from urdfkin.compiled.machine.memory import INTEGERS, integers_at
+from urdfkin.compiled.plan import (
+    REFERENCES,
+    CompiledTree,
+    IntArray,
+    KernelArgs,
+    compile_program,
+    make_scratch,
+)
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-_CORE, _BUSY, _COUNT = map(int, (KernelArgs.CORE, KernelArgs.BUSY, KernelArgs.COUNT))
+_KERNEL, _BUSY, _COUNT = map(int, (KernelArgs.KERNEL, KernelArgs.BUSY, KernelArgs.COUNT))
 _Q, _OUT, _NQ, _NV = map(int, (KernelArgs.Q, KernelArgs.OUT, KernelArgs.NQ, KernelArgs.NV))
 _ORDERS, _AXES, _ROWS, _COLUMNS = map(
     int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
 
 #: Number of 8-byte words in the header of a Python object.
-_OWN = object.__basicsize__ // 8
+_HEADER_WORDS = object.__basicsize__ // 8
 #: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
-_TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
+_TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The number of axes, and the flags, are in the lower four bytes of their words.
-_DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
+_DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
+    _HEADER_WORDS,
+    _HEADER_WORDS + 1,
+    _HEADER_WORDS + 2,
+    _HEADER_WORDS + 5,
+    _HEADER_WORDS + 6,
+)
 #: Index of the word with the byte order and the type number of an array's elements (PyArray_Descr in C).
-_KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
+_KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.
 _READABLE, _WRITABLE = 0x101, 0x501
@@ -72,7 +85,7 @@ def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
         one = ir.Constant(ir.IntType(64), 1)
         return builder.atomic_rmw("xchg", builder.gep(arguments[0], [arguments[1]]), one, "acquire")
 
-    return types.int64(WHOLE_NUMBERS, types.intp), generate
+    return types.int64(INTEGERS, types.intp), generate
 
 
 @intrinsic
@@ -82,25 +95,25 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
         builder.store_atomic(nil, builder.gep(arguments[0], [arguments[1]]), "release", 8)
         return context.get_dummy_value()
 
-    return types.void(WHOLE_NUMBERS, types.intp), generate
+    return types.void(INTEGERS, types.intp), generate
 
 
-@compiled
+@inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
     """Return the address of an array's doubles; 0 if the object has another type, shape or flags."""
-    x = whole_numbers_at(array)
+    x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
-    kind, shape = whole_numbers_at(x[_KIND])[_KIND_AND_ORDER], whole_numbers_at(x[_SHAPE])
+    kind, shape = integers_at(x[_KIND])[_KIND_AND_ORDER], integers_at(x[_SHAPE])
     if kind >> 32 != _DOUBLE or kind >> 16 & _BYTE != _NATIVE:
         return 0
-    alike = shape[0] == rows
+    shape_matches = shape[0] == rows
     for axis in range(1, axes):
-        alike = alike and shape[axis] == columns
-    return x[_DATA] if alike else 0
+        shape_matches = shape_matches and shape[axis] == columns
+    return x[_DATA] if shape_matches else 0
 
 
-@Core
+@CKernel
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration; return None if the arguments are not supported.
 
@@ -110,9 +123,9 @@ def one_configuration(bound, arguments, count):
     of kernel arguments, NumPy's array type and None. The next items are the function that creates the result
     array, and the shape of the result array. The other items are objects that must stay alive.
     """
-    items, inputs = whole_numbers_at(bound), whole_numbers_at(arguments)
-    address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
-    orders = whole_numbers_at(address)[_ORDERS]
+    items, inputs = integers_at(bound), integers_at(arguments)
+    address, ndarray, none = integers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
+    orders = integers_at(address)[_ORDERS]
     if count == orders + 1:
         out = inputs[orders]
         if out == none:
@@ -126,29 +139,29 @@ def one_configuration(bound, arguments, count):
     return none
 
 
-@compiled
+@inline
 def _compute_into(address, inputs, to, ndarray):
     """Write the kernel's result into the array `to`; return whether the result is valid."""
-    task = whole_numbers_at(address)
-    orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
-    out = _doubles_address(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
-    good = out != 0
+    args = integers_at(address)
+    orders, rows, columns, width = args[_ORDERS], args[_ROWS], args[_COLUMNS], args[_NQ]
+    out = _doubles_address(to, ndarray, _WRITABLE, args[_AXES], rows, columns)
+    valid = out != 0
     size = 8 * rows
-    for _ in range(1, task[_AXES]):
+    for _ in range(1, args[_AXES]):
         size *= columns
     for i in range(orders):
-        x = _doubles_address(inputs[i], ndarray, _READABLE, 1, width, 1) if good else 0
-        apart = x + 8 * width <= out or out + size <= x
-        good, width = x != 0 and apart, task[_NV]
-    if not good or _test_and_set(task, _BUSY):
+        x = _doubles_address(inputs[i], ndarray, _READABLE, 1, width, 1) if valid else 0
+        disjoint = x + 8 * width <= out or out + size <= x
+        valid, width = x != 0 and disjoint, args[_NV]
+    if not valid or _test_and_set(args, _BUSY):
         return False
     for i in range(orders):
-        task[_Q + i] = whole_numbers_at(inputs[i])[_DATA]
-    task[_OUT] = out
-    good = _call(task[_CORE], address) == 0
-    task[_COUNT] += good
-    _release(task, _BUSY)
-    return good
+        args[_Q + i] = integers_at(inputs[i])[_DATA]
+    args[_OUT] = out
+    valid = _call(args[_KERNEL], address) == 0
+    args[_COUNT] += valid
+    _release(args, _BUSY)
+    return valid
 
 
 class _Method(ctypes.Structure):
@@ -164,7 +177,7 @@ _FASTCALL = 0x80
 _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.py_object, ctypes.c_void_p)
 
 
-def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
+def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
     """Return a Python function that runs the code at an address and keeps `bound` alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
@@ -173,8 +186,8 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 
 @cache
-def arrays_are_known() -> bool:
-    """Return whether NumPy's arrays have the memory layout that `single` uses."""
+def array_layout_is_known() -> bool:
+    """Return whether NumPy's arrays have the memory layout that `make_single_evaluator` uses."""
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -190,7 +203,7 @@ def arrays_are_known() -> bool:
 
 #: For each quantity: the kernel, the kernel for LOCAL, the number of inputs, and the number of axes of the
 #: result array that have the length nv.
-_HOW: dict[str, tuple[Core, Core, int, int]] = {
+_KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
     "jacobian": (kernels.jacobians, kernels.jacobians, 1, 1),
@@ -199,7 +212,7 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 }
 
 
-def single(
+def make_single_evaluator(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes a quantity for one configuration, and the array of kernel arguments.
@@ -207,37 +220,37 @@ def single(
     The compiled tree must have only one frame, and the base must be fixed. The returned function returns None
     for unsupported arguments. The element `KernelArgs.COUNT` of the array is the number of computed results.
     """
-    core, local_core, orders, columns = _HOW[quantity]
+    kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
-    turned = quantity == "placement" or local
-    program = program_of(plan, turned=turned, columns=columns > 0, pairs=columns > 1)
-    memory = scratch(program)
+    orientations = quantity == "placement" or local
+    program = compile_program(plan, orientations=orientations, columns=columns > 0, hessian=columns > 1)
+    memory = make_scratch(program)
     shape = (4, 4) if quantity == "placement" else (6, *[plan.nv] * columns)
-    address = (local_core if local else core).address
-    compute, task = _called(address, orders, shape, plan, program, memory)
-    task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
-    task[KernelArgs.SCRATCH], task[KernelArgs.REFERENCE] = memory.ctypes.data, REFERENCES[reference]
-    return compute, task
+    address = (local_kernel if local else kernel).address
+    compute, args = _make_evaluator(address, orders, shape, plan, program, memory)
+    args[KernelArgs.PROGRAM], args[KernelArgs.CONSTANTS] = program.addresses
+    args[KernelArgs.SCRATCH], args[KernelArgs.REFERENCE] = memory.ctypes.data, REFERENCES[reference]
+    return compute, args
 
 
-def called(
-    core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
+def wrap_c_function(
+    c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that calls the C function `core` instead of a kernel.
+    """Return a function that calls the C function `c_function` instead of a kernel.
 
     Also return the array of the C function's arguments.
     """
-    address = ctypes.cast(core, ctypes.c_void_p).value
-    return _called(address or 0, orders, shape, plan, core)
+    address = ctypes.cast(c_function, ctypes.c_void_p).value
+    return _make_evaluator(address or 0, orders, shape, plan, c_function)
 
 
-def _called(
+def _make_evaluator(
     address: int, orders: int, shape: tuple[int, ...], plan: CompiledTree, *alive: object
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    task = np.zeros(len(KernelArgs), dtype=np.int64)
-    task[KernelArgs.CORE], task[KernelArgs.ORDERS], task[KernelArgs.N] = address, orders, 1
+    args = np.zeros(len(KernelArgs), dtype=np.int64)
+    args[KernelArgs.KERNEL], args[KernelArgs.ORDERS], args[KernelArgs.N] = address, orders, 1
     # With one configuration, all strides are 0.
-    task[KernelArgs.NQ], task[KernelArgs.NV] = plan.nq, plan.nv
-    task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
-    bound = task, np.ndarray, None, np.empty, shape, *alive
-    return _built_in("compute", one_configuration.address, *bound), task
+    args[KernelArgs.NQ], args[KernelArgs.NV] = plan.nq, plan.nv
+    args[KernelArgs.AXES], args[KernelArgs.ROWS], args[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
+    bound = args, np.ndarray, None, np.empty, shape, *alive
+    return _make_builtin("compute", one_configuration.address, *bound), args

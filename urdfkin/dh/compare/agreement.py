@@ -13,14 +13,20 @@ from urdfkin.dh.compare.fit import (
     CELLS,
     TableArrays,
     TargetPoses,
+    find_hidden_cells,
     fit_cells,
-    fitted_model,
-    hidden_cells,
+    fit_model,
     tip_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
-from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison, has_range
-from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
+from urdfkin.dh.compare.result import (
+    NEGLIGIBLE_ERROR,
+    AbsorbedOffset,
+    CellDifference,
+    TableComparison,
+    has_range,
+)
+from urdfkin.dh.convert import link_names, make_serial_tree, to_convention, to_free_tree
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
@@ -32,31 +38,31 @@ from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
 #: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
-TOLERANCE = 2e-4
+TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported only if their correction reduces the tip error to this fraction, or to
-#: `EXPLAINED`.
-_CORRECTED = 0.5
+#: `NEGLIGIBLE_ERROR`.
+_CORRECTED_FRACTION = 0.5
 #: If a table does not agree, the correction of a mistake must reduce the tip error to this fraction, or to
 #: the tolerance.
-_MISTAKE_CORRECTED = 0.05
-_LEAST_CHANGE = 1e-10
+_CORRECTED_MISTAKE_FRACTION = 0.05
+_MIN_CHANGE = 1e-10
 #: Differing cells without a fit are reported only if they outnumber those after a fit by at most this number.
-_MORE_CELLS = 2
+_MAX_MORE_CELLS = 2
 #: If the tip moves by less than this fraction of the path length, the reach is the path length.
-_FIXED_TIP = 1e-6
+_FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of the last digit (metres or radians) of each cell, for each row.
-Digits = Sequence[Mapping[str, float]]
+HalfDigits = Sequence[Mapping[str, float]]
 
 
 def compare(
     chain: FrameChain,
     reference: DHTable,
-    tolerance: float = TOLERANCE,
+    tolerance: float = TIP_TOLERANCE,
     *,
     fit: bool = True,
-    digits: Digits = (),
+    half_digits: HalfDigits = (),
 ) -> TableComparison:
     """Compare a reference table with a path of a URDF; `tolerance` is the tolerance at the tip (metres).
 
@@ -65,62 +71,64 @@ def compare(
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
-    targets, check_targets = _target_poses(chain)
+    targets, check_targets = _sample_targets(chain)
     written = TableArrays.of(standard)
-    fitted = fitted_model(chain, standard, targets) if fit else written
-    corrected = fit_cells(fitted, targets, _mask(reference), free=fit)
+    fitted = fit_model(chain, standard, targets) if fit else written
+    corrected = fit_cells(fitted, targets, _cell_mask(reference), free=fit)
     metres, radians = check_targets.largest_errors(fitted)
-    written_metres, written_radians = check_targets.largest_errors(written)
+    unfitted_metres, unfitted_radians = check_targets.largest_errors(written)
     residual = check_targets.largest_errors(corrected)[0]
-    cells = _differences(chain, reference, fitted, corrected, check_targets, digits, fit)
-    table = _fitted_table(chain, standard, fitted)
-    most_metres, most_radians = max_tip_error_bound(chain, table)
+    cells = _find_differences(chain, reference, fitted, corrected, check_targets, half_digits, fit)
+    table = _make_fitted_table(chain, standard, fitted)
+    metres_bound, radians_bound = max_tip_error_bound(chain, table)
     comparison = TableComparison(
         reference=table,
         reach=targets.scale,
         travel=sum(max(map(abs, ends)) for ends in _travels(chain).values()),
-        fitted=fit,
+        is_fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
-        offsets=_offsets(standard, fitted),
-        base=_absorbed_offset(written.base, fitted.base),
-        tool=_absorbed_offset(written.tool, fitted.tool),
-        differences=cells if residual <= max(_CORRECTED * metres, EXPLAINED * targets.scale) else (),
-        instead=(),
-        hidden=_hidden(reference, fitted, check_targets) if fit else (),
+        offsets=_joint_offsets(standard, fitted),
+        base=_find_absorbed_offset(written.base, fitted.base),
+        tool=_find_absorbed_offset(written.tool, fitted.tool),
+        differences=cells
+        if residual <= max(_CORRECTED_FRACTION * metres, NEGLIGIBLE_ERROR * targets.scale)
+        else (),
+        unfitted_differences=(),
+        hidden=_find_hidden_cells(reference, fitted, check_targets) if fit else (),
         mistakes=(),
         residual=residual,
         tolerance=tolerance,
         samples=CHECK_SAMPLES,
-        most_metres=most_metres,
-        most_radians=most_radians,
+        metres_bound=metres_bound,
+        radians_bound=radians_bound,
         metres=metres,
         radians=radians,
-        written_metres=written_metres,
-        written_radians=written_radians,
+        unfitted_metres=unfitted_metres,
+        unfitted_radians=unfitted_radians,
     )
-    if comparison.as_written:
+    if comparison.is_exact_unfitted:
         return comparison
-    enough = tolerance if comparison.agrees else max(tolerance, _MISTAKE_CORRECTED * metres)
-    search = MistakeSearch(chain, targets, check_targets, enough)
+    target_error = tolerance if comparison.agrees else max(tolerance, _CORRECTED_MISTAKE_FRACTION * metres)
+    search = MistakeSearch(chain, targets, check_targets, target_error)
     if mistakes := search.find(reference, fit=fit, agrees=comparison.agrees):
         cells = tuple(mistake.cell for mistake in mistakes if mistake.cell is not None)
         return replace(comparison, mistakes=mistakes, differences=cells if len(mistakes) == 1 else ())
     if not fit:
         return comparison
-    cells = _differences_without_fit(chain, reference, written, targets, check_targets, digits)
-    few = len(cells) <= len(comparison.differences) + _MORE_CELLS
-    return replace(comparison, instead=cells if few else ())
+    cells = _find_differences_without_fit(chain, reference, written, targets, check_targets, half_digits)
+    few = len(cells) <= len(comparison.differences) + _MAX_MORE_CELLS
+    return replace(comparison, unfitted_differences=cells if few else ())
 
 
-def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
+def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit.
 
-    The fit stops at a tip error of at most `enough` (metres).
+    The fit stops at a tip error of at most `target_error` (metres).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
-    targets, check_targets = _target_poses(chain)
-    return check_targets.largest_errors(fitted_model(chain, standard, targets, enough, fast=True))
+    targets, check_targets = _sample_targets(chain)
+    return check_targets.largest_errors(fit_model(chain, standard, targets, target_error, fast=True))
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
@@ -131,7 +139,9 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, MIN_ROBOT_SIZE)
+    return max(
+        min(chain.reach, spread) if spread > _FIXED_TIP_SPREAD * chain.reach else chain.reach, MIN_ROBOT_SIZE
+    )
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
@@ -149,14 +159,16 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
     check_lengths_of_table(chain, reference)
 
 
-def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
+def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
     """Return the tip's poses on samples for a fit, and on other samples that check the fit."""
-    values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
+    values, poses = _sample_poses(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
-    return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
+    return TargetPoses(values, poses, scale), TargetPoses(
+        *_sample_poses(chain, CHECK_SAMPLES, _CHECK_SEED), scale
+    )
 
 
-def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
+def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
     """Return random joint values (count, n) and the tip's poses, without mimic rules."""
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
@@ -174,7 +186,7 @@ def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
     }
 
 
-def _offsets(standard: DHTable, fitted: TableArrays) -> tuple[float, ...]:
+def _joint_offsets(standard: DHTable, fitted: TableArrays) -> tuple[float, ...]:
     offsets = []
     for i, row in enumerate(standard.rows):
         theta, d = fitted.cells[i, :2].tolist()
@@ -182,42 +194,48 @@ def _offsets(standard: DHTable, fitted: TableArrays) -> tuple[float, ...]:
     return tuple(offsets)
 
 
-def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
+def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
     shift = float(np.linalg.norm(fitted[:3, 3] - written[:3, 3]))
     return AbsorbedOffset(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
 
 
-def _reference_row(reference: DHTable, i: int, cell: str) -> int | None:
+def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
     """Return the index of the reference row that contains a cell of standard row i; None if no row does."""
-    at = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
-    return at if at < len(reference.rows) else None
+    reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
+    return reference_index if reference_index < len(reference.rows) else None
 
 
-def _mask(reference: DHTable) -> FloatArray:
+def _cell_mask(reference: DHTable) -> FloatArray:
     """Return an (n, 5) mask of cells in standard rows: 1 if the reference contains the cell, else 0."""
     rows = range(len(reference.rows))
-    return np.array([[float(_reference_row(reference, i, cell) is not None) for cell in CELLS] for i in rows])
+    return np.array(
+        [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]
+    )
 
 
-def _hidden(
+def _find_hidden_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
     """Return row and name of each cell whose error is hidden by a fit of base, tool and joint offsets."""
     hidden = []
-    for i, k in hidden_cells(fitted, check_targets):
-        at = _reference_row(reference, i, CELLS[k])
-        if at is not None and k != fitted.variables[i] and (CELLS[k] != "beta" or fitted.cells[i, k]):
-            hidden.append((at, CELLS[k]))
+    for i, k in find_hidden_cells(fitted, check_targets):
+        reference_index = _reference_row_index(reference, i, CELLS[k])
+        if (
+            reference_index is not None
+            and k != fitted.variable_indices[i]
+            and (CELLS[k] != "beta" or fitted.cells[i, k])
+        ):
+            hidden.append((reference_index, CELLS[k]))
     return tuple(sorted(hidden))
 
 
-def _differences(
+def _find_differences(
     chain: FrameChain,
     reference: DHTable,
     fitted: TableArrays,
     corrected: TableArrays,
     check_targets: TargetPoses,
-    digits: Digits,
+    half_digits: HalfDigits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
     """Return the cells that differ by more than rounding, the largest effect on the tip first."""
@@ -229,37 +247,43 @@ def _differences(
         for k, cell in enumerate(CELLS):
             change = float(corrected.cells[i, k] - row[k])
             size = abs(change) * (1.0 if cell in ("a", "d") else scale)
-            at = _reference_row(reference, i, cell)
-            if at is None or (free and k == fitted.variables[i]) or size <= _LEAST_CHANGE * scale:
+            reference_index = _reference_row_index(reference, i, cell)
+            if (
+                reference_index is None
+                or (free and k == fitted.variable_indices[i])
+                or size <= _MIN_CHANGE * scale
+            ):
                 continue
-            value = getattr(reference.rows[at], cell)
+            value = getattr(reference.rows[reference_index], cell)
             effect = float(largest[i, k] * size)
-            last = digits[at].get(cell, 0.0) if at < len(digits) else 0.0
-            name = chain.joints[at].name
-            differences.append(CellDifference(at, name, cell, value, value + change, effect, last))
-    return tuple(sorted(differences, key=lambda one: (-one.tip, one.row, one.cell)))
+            last = half_digits[reference_index].get(cell, 0.0) if reference_index < len(half_digits) else 0.0
+            name = chain.joints[reference_index].name
+            differences.append(
+                CellDifference(reference_index, name, cell, value, value + change, effect, last)
+            )
+    return tuple(sorted(differences, key=lambda one: (-one.tip_displacement, one.row, one.cell)))
 
 
-def _differences_without_fit(
+def _find_differences_without_fit(
     chain: FrameChain,
     reference: DHTable,
     written: TableArrays,
     targets: TargetPoses,
     check_targets: TargetPoses,
-    digits: Digits,
+    half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
     """Return the cells that differ without a fit.
 
     The result is empty if a tip error remains after a correction of these cells.
     """
-    corrected = fit_cells(written, targets, _mask(reference), free=False)
+    corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
-    if metres > EXPLAINED * targets.scale or radians > EXPLAINED:
+    if metres > NEGLIGIBLE_ERROR * targets.scale or radians > NEGLIGIBLE_ERROR:
         return ()
-    return _differences(chain, reference, written, corrected, check_targets, digits, False)
+    return _find_differences(chain, reference, written, corrected, check_targets, half_digits, False)
 
 
-def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:
+def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
         theta, d = fitted.cells[i, :2].tolist()
@@ -276,15 +300,15 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
     limits, or within `ASSUMED_LIMIT` of zero if `has_range` is false.
     """
-    mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
+    mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
-    variables = variables_of(pair, tolerance_of(*mechanisms))
+    variable_indices = variables_of(pair, tolerance_of(*mechanisms))
     tip = link_names(table)[-1]
     frame = next(frame for frame in pair.frames if pair.a.tree.links[frame.a] == tip)
-    return upper_bounds(pair, variables, frame, FINE_GRID)
+    return upper_bounds(pair, variable_indices, frame, FINE_GRID)
 
 
-def _free(path: FrameChain, table: DHTable) -> KinematicTree:
+def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
     """Return a path as a tree without mimic rules, with the link names of the table."""
     travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
     joints = []
@@ -292,5 +316,5 @@ def _free(path: FrameChain, table: DHTable) -> KinematicTree:
         kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
         limit = Limit(*travels[joint.name], math.inf, math.inf) if joint.name in travels else None
         joints.append(Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit))
-    joints.append(replace(free_tree(table).joints[-1], T_parent_joint=path.T_last_tip))
-    return serial_tree(path.robot, link_names(table), joints)
+    joints.append(replace(to_free_tree(table).joints[-1], T_parent_joint=path.T_last_tip))
+    return make_serial_tree(path.robot, link_names(table), joints)

@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.dh.compare.signs import align
+from urdfkin.dh.compare.signs import find_sign_fits
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import DHTable, along_axis, between_axes
+from urdfkin.dh.table import DHTable, joint_transform, link_transform
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, fit_roundings
@@ -39,21 +39,21 @@ _MOTIONS = {
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
 #: Maximum change of a parameter in one step of the fit (rad, or a fraction of the reach).
-_LONGEST_STEP = 0.5
+_MAX_STEP = 0.5
 _MAX_STEPS = 40
-_LEAST_DECREASE = 1e-9
+_MIN_DECREASE = 1e-9
 #: Mean error, relative to the reach, at which the fit of the cells ends.
-_SOLVED = 1e-14
+_CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
-_LEAST_WEIGHT = 1e-9
+_MIN_WEIGHT = 1e-9
 #: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
 #: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_WEIGHT = 1.2
 #: Initial weight of each beta, and the factor that multiplies the weights of beta at each reweighting.
 #: Both numbers are small, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
-_SAME_EFFECT = 1e-6
+_SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
 #: Below this mean error, relative to the reach, joint offsets are not changed by large angles.
 _ROUNDING = 1e-13
@@ -63,7 +63,7 @@ _TIP_ROUNDING = 1e-12
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: Arguments `count` and `beam` of `align` in a fast fit.
+#: Arguments `count` and `beam` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)
 
 
@@ -88,21 +88,21 @@ class TableArrays:
         )
 
     @cached_property
-    def first(self) -> FloatArray:
+    def T_0_first(self) -> FloatArray:
         """(4, 4) pose of the first revolute joint's frame in frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @cached_property
-    def last(self) -> FloatArray:
+    def T_last_tip(self) -> FloatArray:
         """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
         turning = np.flatnonzero(self.turns)
         begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
 
     @cached_property
-    def variables(self) -> tuple[int, ...]:
+    def variable_indices(self) -> tuple[int, ...]:
         """For each row, the index of the cell with the joint's variable: theta or d."""
         return tuple(CELLS.index("theta" if turns else "d") for turns in self.turns)
 
@@ -110,18 +110,18 @@ class TableArrays:
     def _motions(self) -> tuple[ElementaryMotion, ...]:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
-    def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
+    def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path from base to tip, and the amounts (s, 5 n) of its elementary motions (rad or m).
 
         `values` (s, n) contains the joint values of s samples.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
-        for i, k in enumerate(self.variables):
+        for i, k in enumerate(self.variable_indices):
             amounts[:, len(CELLS) * i + k] += self.senses[i] * values[:, i]
         return Path((self.base, *self._motions, self.tool)), amounts
 
     def poses(self, values: FloatArray) -> FloatArray:
-        path, amounts = self.path_at(values)
+        path, amounts = self.path_and_amounts(values)
         return path.poses(amounts)
 
 
@@ -157,17 +157,17 @@ def tip_derivatives(
     base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.
     """
     scale = targets.scale
-    path, amounts = model.path_at(targets.values)
+    path, amounts = model.path_and_amounts(targets.values)
     poses, twists = path.pose_and_jacobian_from_frames(path.frames(amounts) if frames is None else frames)
     n = len(model.cells)
     twists = twists * np.where(np.tile(_IS_ANGLE, n), 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
     cells = twists.reshape(-1, len(CELLS) * n)
-    variables = [len(CELLS) * i + k for i, k in enumerate(model.variables)]
-    first = np.broadcast_to(model.base @ model.first, poses.shape)
-    last = poses @ np.linalg.inv(model.last)
-    ends = [_frame_twists(poses, frame, scale) for frame in (first, last)]
-    return poses, np.hstack([*ends, cells[:, variables]]), cells
+    variable_indices = [len(CELLS) * i + k for i, k in enumerate(model.variable_indices)]
+    first_frames = np.broadcast_to(model.base @ model.T_0_first, poses.shape)
+    last_frames = poses @ np.linalg.inv(model.T_last_tip)
+    ends = [_frame_twists(poses, frame, scale) for frame in (first_frames, last_frames)]
+    return poses, np.hstack([*ends, cells[:, variable_indices]]), cells
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
@@ -180,24 +180,24 @@ def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatA
     return twists.reshape(-1, 6)
 
 
-def with_changes(
+def apply_changes(
     model: TableArrays, free: FloatArray, scale: float, cells: FloatArray | None = None
 ) -> TableArrays:
     """Return the model after small changes of free parameters and cells; angles are multiplied by `scale`."""
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
-        k = model.variables[i]
+        k = model.variable_indices[i]
         new_cells[i, k] += offset * units[k]
     # The twist that changes the base is expressed in the frame of the first revolute joint.
     # The twist that changes the tool is expressed in the frame of the last revolute joint.
     # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
-    base = _with_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
-    tool = np.linalg.inv(model.last) @ _with_twist(np.eye(4), free[6:12], scale) @ model.last
+    base = _apply_twist(model.base @ model.T_0_first, free[:6], scale) @ np.linalg.inv(model.T_0_first)
+    tool = np.linalg.inv(model.T_last_tip) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.T_last_tip
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
-def _with_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
+def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
     """Return T after a small translation and rotation, which are expressed in the frame of T."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
@@ -212,17 +212,17 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         poses, by_free, by_cells = tip_derivatives(model, targets)
         error = targets.errors(poses)
         size = float(np.linalg.norm(error))
-        if size < best_size * (1.0 - _LEAST_DECREASE):
+        if size < best_size * (1.0 - _MIN_DECREASE):
             best, best_size = model, size
-        elif size > 2.0 * best_size or size <= _SOLVED * scale * len(error):
+        elif size > 2.0 * best_size or size <= _CONVERGED_ERROR * scale * len(error):
             break
         by_cells = by_cells * mask.ravel()
         by_free = by_free if free else np.zeros_like(by_free)
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
         # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
-        shorten = min(1.0, _LONGEST_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
-        model = with_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
+        shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
+        model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
     return best
 
 
@@ -251,7 +251,7 @@ def _sparse_changes(
     for _ in range(_REWEIGHTINGS):
         scaled = np.linalg.lstsq(triangular * weights, orthonormal.T @ target, rcond=_RCOND_CELLS)[0]
         changes = weights * scaled
-        weights = np.abs(changes) + _LEAST_WEIGHT * scale
+        weights = np.abs(changes) + _MIN_WEIGHT * scale
         weights[betas] *= _BETA_FACTOR
     return np.asarray(changes - earlier, np.float64)
 
@@ -260,27 +260,27 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
     return np.linalg.qr(by_free)[0] if by_free.any() else np.zeros((len(by_free), 0))
 
 
-def hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
+def find_hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
     """Return (row, cell index) of each cell whose effect on the tip can be reproduced by free parameters."""
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)
-    hidden = np.flatnonzero(remaining <= _SAME_EFFECT * np.linalg.norm(by_cells, axis=0))
+    hidden = np.flatnonzero(remaining <= _SAME_EFFECT_TOLERANCE * np.linalg.norm(by_cells, axis=0))
     return [divmod(int(index), len(CELLS)) for index in hidden]
 
 
 # -- free parameters -----------------------------------------------------------------------------------
 
 
-def fitted_model(
+def fit_model(
     chain: FrameChain,
     standard: DHTable,
     targets: TargetPoses,
-    enough: float = 0.0,
+    target_error: float = 0.0,
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters; stop at a tip error of at most `enough` (metres)."""
+    """Fit the free parameters; stop at a tip error of at most `target_error` (metres)."""
     written = TableArrays.of(standard)
 
     def size(model: TableArrays) -> float:
@@ -297,21 +297,21 @@ def fitted_model(
         model_size = size(model)
         if model_size < (1.0 if i == 0 else _OTHER_START_ERROR) * best_size:
             best, best_size = model, model_size
-        if best_size <= max(enough, _TIP_ROUNDING * targets.scale):
+        if best_size <= max(target_error, _TIP_ROUNDING * targets.scale):
             break
-    return with_end_offsets_in_base_and_tool(best, written)
+    return move_end_offsets_to_base_and_tool(best, written)
 
 
-def with_end_offsets_in_base_and_tool(model: TableArrays, written: TableArrays) -> TableArrays:
+def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) -> TableArrays:
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
-    X = between_axes(a, alpha, beta)
+    X = link_transform(a, alpha, beta)
     base, tool = model.base, model.tool
     for i in dict.fromkeys((0, n - 1)):
-        k = model.variables[i]
+        k = model.variable_indices[i]
         offset = cells[i, k] - written.cells[i, k]
         cells[i, k] = written.cells[i, k]
-        S = along_axis(offset, 0.0) if model.turns[i] else along_axis(0.0, offset)
+        S = joint_transform(offset, 0.0) if model.turns[i] else joint_transform(0.0, offset)
         if i == 0:
             base = base @ S
         else:
@@ -322,10 +322,10 @@ def with_end_offsets_in_base_and_tool(model: TableArrays, written: TableArrays) 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
     """Yield the written table, then the table with each likely combination of joint signs."""
     yield TableArrays.of(standard)
-    for alignment in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
+    for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
         model = replace(TableArrays.of(standard), senses=senses, base=alignment.base, tool=alignment.tool)
-        model.cells[range(len(senses)), model.variables] += alignment.offsets
+        model.cells[range(len(senses)), model.variable_indices] += alignment.offsets
         yield model
 
 
@@ -337,7 +337,7 @@ def fit_free_parameters(
         model, size = _least_squares_fit(model, targets, only_ends)
         if not large_angles or size <= _ROUNDING * targets.scale * math.sqrt(6 * len(targets.values)):
             break
-        changed = min(_with_large_angles(model), key=lambda one: _size(one, targets), default=model)
+        changed = min(_add_large_angles(model), key=lambda one: _size(one, targets), default=model)
         if _size(changed, targets) >= size:
             break
         model = changed
@@ -352,7 +352,7 @@ def _least_squares_fit(
     model: TableArrays, targets: TargetPoses, only_ends: bool
 ) -> tuple[TableArrays, float]:
     def residuals(model: TableArrays) -> tuple[FloatArray, FloatArray]:
-        path, amounts = model.path_at(targets.values)
+        path, amounts = model.path_and_amounts(targets.values)
         frames = path.frames(amounts)
         return targets.errors(frames[..., -1, :, :]), frames
 
@@ -363,13 +363,13 @@ def _least_squares_fit(
         model,
         residuals,
         derivatives,
-        lambda model, free: with_changes(model, free, targets.scale),
-        max_step=_LONGEST_STEP * targets.scale,
+        lambda model, free: apply_changes(model, free, targets.scale),
+        max_step=_MAX_STEP * targets.scale,
         patience=_PATIENCE,
     )
 
 
-def _with_large_angles(model: TableArrays) -> list[TableArrays]:
+def _add_large_angles(model: TableArrays) -> list[TableArrays]:
     """Return models with an angle added to one joint offset and subtracted from the next joint offset."""
     models = []
     for i in range(len(model.cells) - 1):

@@ -2,8 +2,8 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`diagnose` ranks the interpretations by the difference of the shapes from the URDF's shape, and by the number
-of changes of the file's interpretation. It fits at most three interpretations.
+`find_better_interpretation` ranks the interpretations by the difference of the shapes from the URDF's shape,
+and by the number of changes of the file's interpretation. It fits at most three interpretations.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ import numpy as np
 from urdfkin.dh.compare.agreement import compare, fast_fit_errors
 from urdfkin.dh.compare.result import TableComparison
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, derive
-from urdfkin.dh.rows import by_column, table_from_mapping
+from urdfkin.dh.derive import DerivationOptions, derive
+from urdfkin.dh.rows import name_cells, table_from_mapping
 from urdfkin.dh.table import DHConvention, DHTable, convention_of, looks_round
-from urdfkin.dh.units import COLUMNS, Angles, Lengths, units_of
+from urdfkin.dh.units import COLUMNS, AngleUnit, LengthUnit, parse_units
 from urdfkin.errors import InputError, QuestionsSection, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-_MOST_FITS = 3
+_MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
-_PARALLEL = 2e-2
+_PARALLEL_TILT = 2e-2
 #: Each change of the file's interpretation costs this fraction of the smallest difference of shapes.
 _DIFFERENCE_COST = 0.1
 #: A better interpretation has at most this fraction of the stated tip error, and of the reach, as tip error.
-_BETTER = 0.05
-#: `diagnose` ignores all other keys of a row, such as limits and mimic rules.
-_CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `diagnose` ignores these keys of a table, because it fits base and tool.
-_ENDS = ("base", "tool", "coordinates")
+_BETTER_FRACTION = 0.05
+#: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
+_ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
+#: `find_better_interpretation` ignores these keys of a table, because it fits base and tool.
+_IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
-_LONGEST, _SHORTEST = 20.0, 1e-3
+_MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class BetterInterpretation:
         }
 
 
-def diagnose(
+def find_better_interpretation(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
 ) -> BetterInterpretation | None:
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
@@ -79,29 +79,29 @@ def diagnose(
     error is at most 5 % of `stated_error` and of the reach, or at most `tolerance` (metres).
     """
     kinds = [joint.kind.turns for joint in chain.joints]
-    shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
+    shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
     try:
-        stated = stated_interpretation(data)
+        stated = parse_interpretation(data)
     except InputError:  # `table_from_mapping` reports this error.
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             return None
-        difference = float(np.abs(shape(table, chain.reach) - shape_of_urdf).sum())
+        difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())
         candidates.append((difference, interpretation.difference_count(stated), interpretation, table))
     if not candidates:
         return None
     cost = _DIFFERENCE_COST * min(difference for difference, *_ in candidates) + tolerance
     candidates.sort(key=lambda candidate: candidate[0] + cost * candidate[1])
     better = list[tuple[float, BetterInterpretation]]()
-    for _, count, interpretation, table in candidates[:_MOST_FITS]:
+    for _, count, interpretation, table in candidates[:_MAX_FITS]:
         try:
             metres, radians = fast_fit_errors(chain, table, tolerance)
         except RangeError:  # A length is too large in this interpretation.
             continue
         error = metres + radians * chain.reach
-        if error <= max(tolerance, min(_BETTER * stated_error, _BETTER * chain.reach)):
+        if error <= max(tolerance, min(_BETTER_FRACTION * stated_error, _BETTER_FRACTION * chain.reach)):
             result = BetterInterpretation(interpretation, stated, metres, radians)
             better.append((error + tolerance * count, result))
             if error <= tolerance:
@@ -109,7 +109,7 @@ def diagnose(
     return min(better, key=lambda rated: rated[0])[1] if better else None
 
 
-def convention_that_fits(
+def find_dh_convention(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
     """Return the convention with which a table fits a path better.
@@ -125,7 +125,7 @@ def convention_that_fits(
         except InputError as error:
             errors.append(error)
     tests: tuple[Callable[[TableComparison], object], ...] = (
-        lambda comparison: comparison.agrees and comparison.written_metres <= tolerance,
+        lambda comparison: comparison.agrees and comparison.unfitted_metres <= tolerance,
         lambda comparison: comparison.passes,
         lambda comparison: comparison.agrees,
         lambda comparison: comparison.mistakes,
@@ -134,7 +134,11 @@ def convention_that_fits(
     best = next(filter(None, by_test), [])
     if len(best) == 1:
         return best[0]
-    if not best and (better := diagnose(chain, data, tolerance)) and better.interpretation.convention:
+    if (
+        not best
+        and (better := find_better_interpretation(chain, data, tolerance))
+        and better.interpretation.convention
+    ):
         return better.interpretation.convention
     if errors and not comparisons:
         raise errors[0]
@@ -148,7 +152,7 @@ def convention_that_fits(
     )
 
 
-def shape(table: DHTable, scale: float) -> FloatArray:
+def path_shape(table: DHTable, scale: float) -> FloatArray:
     """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
 
     Joint signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices
@@ -159,7 +163,7 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     for row, following in pairwise(rows):
         both_turn = row.kind.turns and following.kind.turns
         tilt = math.atan2(math.hypot(math.sin(row.alpha), math.sin(row.beta)), abs(math.cos(row.alpha)))
-        parallel = tilt < _PARALLEL
+        parallel = tilt < _PARALLEL_TILT
         offset, is_defined = offset + row.d, is_defined and both_turn
         numbers += [
             abs(offset) if is_defined and not parallel else 0.0,
@@ -176,8 +180,8 @@ class Interpretation:
     """Convention, units, and the true contents of the columns a, alpha, d and theta."""
 
     convention: DHConvention | None
-    lengths: Lengths
-    angles: Angles
+    lengths: LengthUnit
+    angles: AngleUnit
     columns: tuple[str, ...] = COLUMNS
 
     def table(self, data: Mapping[str, Any]) -> DHTable:
@@ -185,12 +189,14 @@ class Interpretation:
         stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         contents = dict(zip(COLUMNS, self.columns, strict=True))
         rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]
-        rest = {key: value for key, value in data.items() if key not in _ENDS}
+        rest = {key: value for key, value in data.items() if key not in _IGNORED_KEYS}
         return table_from_mapping({**rest, **stated, "rows": rows})
 
     def difference_count(self, other: Interpretation) -> int:
         """Return the number of differences; two exchanged columns count as one difference."""
-        columns = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
+        columns = sum(
+            column != expected for column, expected in zip(self.columns, other.columns, strict=True)
+        )
         return len(self._convention_and_units(other)) + (columns + 1) // 2
 
     def differences(self, other: Interpretation) -> str:
@@ -201,12 +207,14 @@ class Interpretation:
         return ", ".join(names)
 
     def _convention_and_units(self, other: Interpretation) -> list[str]:
-        mine, theirs = ((one.convention, one.lengths, one.angles) for one in (self, other))
-        return [str(name) for name, other_name in zip(mine, theirs, strict=True) if name is not other_name]
+        values, other_values = ((one.convention, one.lengths, one.angles) for one in (self, other))
+        return [
+            str(name) for name, other_name in zip(values, other_values, strict=True) if name is not other_name
+        ]
 
 
-def stated_interpretation(data: Mapping[str, Any]) -> Interpretation:
-    units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
+def parse_interpretation(data: Mapping[str, Any]) -> Interpretation:
+    units = parse_units(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return Interpretation(convention, units.lengths, units.angles)
 
@@ -216,28 +224,28 @@ def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretat
     rows = data.get("rows")
     if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return
-    named = (row if isinstance(row, Mapping) else by_column(row) for row in rows)
-    stated = stated_interpretation(data)
-    data = {**data, "rows": [{key: row[key] for key in row if key in _CELLS} for row in named]}
-    choices = product(DHConvention, Lengths, Angles, permutations(COLUMNS))
-    interpretations = [Interpretation(*choice) for choice in choices]
+    named = (row if isinstance(row, Mapping) else name_cells(row) for row in rows)
+    stated = parse_interpretation(data)
+    data = {**data, "rows": [{key: row[key] for key in row if key in _ROW_KEYS} for row in named]}
+    options = product(DHConvention, LengthUnit, AngleUnit, permutations(COLUMNS))
+    interpretations = [Interpretation(*choice) for choice in options]
     for interpretation in sorted(interpretations, key=lambda one: one.difference_count(stated)):
         if interpretation != stated:
             with suppress(InputError):
                 yield interpretation, interpretation.table(data)
 
 
-def table_warnings(table: DHTable) -> list[str]:
+def find_table_warnings(table: DHTable) -> list[str]:
     """Return warnings about units or columns that look wrong, each with a remedy."""
     warnings = []
     columns = {name: [getattr(row, name) for row in table.rows if getattr(row, name)] for name in COLUMNS}
     lengths = [abs(length) for length in (*columns["a"], *columns["d"])]
-    if lengths and max(lengths) > _LONGEST and all(length > _SHORTEST * 1e3 for length in lengths):
+    if lengths and max(lengths) > _MAX_LENGTH and all(length > _MIN_LENGTH * 1e3 for length in lengths):
         warnings.append(
             f"lengths up to {max(lengths):.4g} m look like millimetres:"
             " if they are millimetres, write lengths = 'millimetres'"
         )
-    elif lengths and max(lengths) < _SHORTEST * 2.0:
+    elif lengths and max(lengths) < _MIN_LENGTH * 2.0:
         warnings.append(
             f"lengths of at most {max(lengths) * 1e3:.3g} mm look like metres:"
             " if they are metres, write lengths = 'metres'"

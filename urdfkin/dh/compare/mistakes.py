@@ -19,10 +19,10 @@ from urdfkin.dh.compare.fit import (
     TableArrays,
     TargetPoses,
     fit_free_parameters,
+    move_end_offsets_to_base_and_tool,
     start_models,
-    with_end_offsets_in_base_and_tool,
 )
-from urdfkin.dh.compare.result import CellDifference, Fitted, Mistake, MistakeKind, resolution
+from urdfkin.dh.compare.result import CellDifference, FitChanges, Mistake, MistakeKind, fit_resolution
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
@@ -31,9 +31,9 @@ from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
-_SAME_ANGLE = 1e-9
+_ANGLE_TOLERANCE = 1e-9
 #: If a table has more possible corrections, `MistakeSearch.find` does not fit joint offsets and joint signs.
-_MOST_FITS = 100
+_MAX_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,33 +63,33 @@ class MistakeSearch:
         A correction of such a table is reported only if the fit then changes at most the base or the tool,
         but not both.
         """
-        if self._as_written(reference) is not None:
+        if self._without_fit(reference) is not None:
             return ()
-        fits = [self._as_written]
+        fits = [self._without_fit]
         if fit and not (agrees and self._needs_one_parameter(reference)):
-            fits.append(self._with_one_end)
+            fits.append(self._fit_one_end)
         if fit and not agrees:
-            fits += [self._with_both_ends, self._with_zeros]
+            fits += [self._fit_both_ends, self._fit_zeros_and_senses]
         corrections = list(_corrections(reference))
         for fit_table in fits:
-            if fit_table == self._with_zeros and len(corrections) > _MOST_FITS:
+            if fit_table == self._fit_zeros_and_senses and len(corrections) > _MAX_FITS:
                 break
             mistakes = [
-                self._mistake(reference, correction, model)
+                self._make_mistake(reference, correction, model)
                 for correction in corrections
                 if (model := fit_table(correction.table)) is not None
             ]
             if mistakes:
-                least = min(mistake.fitted.count for mistake in mistakes)
-                return tuple(mistake for mistake in mistakes if mistake.fitted.count == least)
+                least = min(mistake.fit_changes.count for mistake in mistakes)
+                return tuple(mistake for mistake in mistakes if mistake.fit_changes.count == least)
         return ()
 
     def _needs_one_parameter(self, table: DHTable) -> bool:
         """Whether a table agrees after a fit of one parameter: base, tool, a joint offset or a joint sign."""
-        if self._with_one_end(table) is not None:
+        if self._fit_one_end(table) is not None:
             return True
-        model = self._with_zeros(table)
-        return model is not None and self._fitted(_model(table), model).count <= 1
+        model = self._fit_zeros_and_senses(table)
+        return model is not None and self._find_fit_changes(_make_model(table), model).count <= 1
 
     def _agrees(self, model: TableArrays) -> bool:
         metres, radians = self.check_targets.largest_errors(model)
@@ -97,47 +97,47 @@ class MistakeSearch:
 
     # -- fits; each function returns None if the fitted table does not agree with the URDF ---------------
 
-    def _as_written(self, table: DHTable) -> TableArrays | None:
-        model = _model(table)
+    def _without_fit(self, table: DHTable) -> TableArrays | None:
+        model = _make_model(table)
         return model if self._agrees(model) else None
 
-    def _with_one_end(self, table: DHTable) -> TableArrays | None:
+    def _fit_one_end(self, table: DHTable) -> TableArrays | None:
         """Fit only the tool; if the table then does not agree, fit only the base."""
-        model = _model(table)
+        model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
-        with_tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ target_poses))
-        with_base = replace(model, base=_mean(target_poses @ np.linalg.inv(poses) @ model.base))
+        with_tool = replace(model, tool=_mean_pose(model.tool @ np.linalg.inv(poses) @ target_poses))
+        with_base = replace(model, base=_mean_pose(target_poses @ np.linalg.inv(poses) @ model.base))
         return next((fitted for fitted in (with_tool, with_base) if self._agrees(fitted)), None)
 
-    def _with_both_ends(self, table: DHTable) -> TableArrays | None:
+    def _fit_both_ends(self, table: DHTable) -> TableArrays | None:
         """Fit base and tool; the start value of the base is a solution of A X = X B."""
-        model = _model(table)
+        model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         A, B = target_poses @ np.linalg.inv(target_poses[0]), poses @ np.linalg.inv(poses[0])
-        X = _hand_eye(A, B)
-        tool = _mean(model.tool @ np.linalg.inv(X @ poses) @ target_poses)
+        X = _solve_hand_eye(A, B)
+        tool = _mean_pose(model.tool @ np.linalg.inv(X @ poses) @ target_poses)
         fitted = replace(model, base=X @ model.base, tool=tool)
         if not self._agrees(fitted):
             fitted = fit_free_parameters(fitted, self.targets, large_angles=False, only_ends=True)
         return fitted if self._agrees(fitted) else None
 
-    def _with_zeros(self, table: DHTable) -> TableArrays | None:
+    def _fit_zeros_and_senses(self, table: DHTable) -> TableArrays | None:
         """Fit base, tool, joint offsets and joint signs; return the fit with the fewest changes."""
-        standard, written = to_convention(table, DHConvention.STANDARD), _model(table)
+        standard, written = to_convention(table, DHConvention.STANDARD), _make_model(table)
         fits = [
             fit_free_parameters(start, self.targets, large_angles=False)
             for start in start_models(self.chain, standard, *FAST_SEARCH)
         ]
-        models = [with_end_offsets_in_base_and_tool(fit, written) for fit in fits]
+        models = [move_end_offsets_to_base_and_tool(fit, written) for fit in fits]
         agreeing = [model for model in models if self._agrees(model)]
-        return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
+        return min(agreeing, key=lambda model: self._find_fit_changes(written, model).count, default=None)
 
-    def _fitted(self, written: TableArrays, model: TableArrays) -> Fitted:
+    def _find_fit_changes(self, written: TableArrays, model: TableArrays) -> FitChanges:
         """Return which parameters a fit changed; changes up to the resolution of the fit do not count."""
         metres, radians = self.check_targets.largest_errors(model)
-        fine = resolution(metres / self.check_targets.scale, radians)
+        fine = fit_resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))
-        offsets = model.cells[rows, model.variables] - written.cells[rows, model.variables]
+        offsets = model.cells[rows, model.variable_indices] - written.cells[rows, model.variable_indices]
         angles = np.abs(np.remainder(offsets + math.pi, 2.0 * math.pi) - math.pi)
         zeros = np.where(model.turns > 0.0, angles, np.abs(offsets) / self.check_targets.scale)
         base, tool = (
@@ -146,22 +146,22 @@ class MistakeSearch:
             for T, T_written in ((model.base, written.base), (model.tool, written.tool))
         )
         reversed_ = int((model.senses != written.senses).sum())
-        return Fitted(base, tool, int((zeros > fine).sum()), reversed_)
+        return FitChanges(base, tool, int((zeros > fine).sum()), reversed_)
 
-    def _mistake(self, reference: DHTable, correction: _TableCorrection, model: TableArrays) -> Mistake:
+    def _make_mistake(self, reference: DHTable, correction: _TableCorrection, model: TableArrays) -> Mistake:
         metres, radians = self.check_targets.largest_errors(model)
         tables, cell = (reference, correction.table), None
         if correction.cell is not None:
             row = correction.rows[0]
             old, new = (getattr(table.rows[row], correction.cell) for table in tables)
-            before, after = (_model(table).poses(self.check_targets.values) for table in tables)
+            before, after = (_make_model(table).poses(self.check_targets.values) for table in tables)
             tip = float(np.linalg.norm(before[:, :3, 3] - after[:, :3, 3], axis=-1).max())
             cell = CellDifference(row, self.chain.joints[row].name, correction.cell, old, new, tip)
-        fitted = self._fitted(_model(correction.table), model)
+        fitted = self._find_fit_changes(_make_model(correction.table), model)
         return Mistake(correction.kind, correction.rows, cell, correction.table, fitted, metres, radians)
 
 
-def _model(table: DHTable) -> TableArrays:
+def _make_model(table: DHTable) -> TableArrays:
     return TableArrays.of(to_convention(table, DHConvention.STANDARD))
 
 
@@ -169,13 +169,15 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
     for i, row in enumerate(reference.rows):
         for cell in COLUMNS:
             value = getattr(row, cell)
-            if abs(math.sin(value) if cell in ("alpha", "theta") else value) > _SAME_ANGLE:
-                yield _TableCorrection(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
+            if abs(math.sin(value) if cell in ("alpha", "theta") else value) > _ANGLE_TOLERANCE:
+                yield _TableCorrection(
+                    MistakeKind.SIGN, (i,), cell, _replace_cell(reference, i, cell, -value)
+                )
         for right_angle in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + right_angle, 2.0 * math.pi)
-            is_opposite_sign = abs(angle_difference(value, -row.alpha)) <= _SAME_ANGLE
+            is_opposite_sign = abs(angle_difference(value, -row.alpha)) <= _ANGLE_TOLERANCE
             if not is_opposite_sign:
-                table = _with_cell(reference, i, "alpha", value)
+                table = _replace_cell(reference, i, "alpha", value)
                 yield _TableCorrection(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
     for i, j in combinations(range(len(reference.rows)), 2):
@@ -188,28 +190,28 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, indices, rows in orders:
         same_kinds = [row.kind.turns for row in rows] == [row.kind.turns for row in reference.rows]
-        if same_kinds and any(_numbers(rows[i]) != _numbers(reference.rows[i]) for i in indices):
+        if same_kinds and any(_row_numbers(rows[i]) != _row_numbers(reference.rows[i]) for i in indices):
             yield _TableCorrection(kind, indices, None, replace(reference, rows=tuple(rows)))
 
 
-def _numbers(row: DHRow) -> tuple[float, ...]:
+def _row_numbers(row: DHRow) -> tuple[float, ...]:
     return (*row.cells, float(row.sense))
 
 
-def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
+def _replace_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
     number: dict[str, Any] = {cell: value}
     row = replace(table.rows[i], **number)
     return replace(table, rows=(*table.rows[:i], row, *table.rows[i + 1 :]))
 
 
-def _mean(poses: FloatArray) -> FloatArray:
+def _mean_pose(poses: FloatArray) -> FloatArray:
     """Return the (4, 4) mean of nearly equal poses."""
     mean = poses.mean(axis=0)
     R = polar_factor(mean[:3, :3])
     return pose(R, mean[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])
 
 
-def _hand_eye(A: FloatArray, B: FloatArray) -> FloatArray:
+def _solve_hand_eye(A: FloatArray, B: FloatArray) -> FloatArray:
     """Solve A X = X B for X (4, 4) in least squares over poses (s, 4, 4): Park and Martin (1994)."""
     turns = log_rotation(A[:, :3, :3]).T @ log_rotation(B[:, :3, :3])
     U, _, Vt = np.linalg.svd(turns)

@@ -22,11 +22,11 @@ Parts = list[str | Table | Matrix]
 
 #: Largest tip error (rad, or metres per metre of reach) that counts as zero after a correction of cells.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
-EXPLAINED = 1e-9
-#: `resolution` replaces a smaller tip error (rad, or metres per metre of reach) by this number.
-_FINEST = 1e-12
+NEGLIGIBLE_ERROR = 1e-9
+#: `fit_resolution` replaces a smaller tip error (rad, or metres per metre of reach) by this number.
+_MIN_TIP_ERROR = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
-_HALF = 1.0 + 1e-6
+_HALF_DIGIT_FACTOR = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class CellDifference:
     """One cell of a published table that differs from the URDF's value (metres or radians).
 
     Attributes:
-        tip: Largest displacement (metres) of the tip on the samples if only this cell differs.
-        last_digit: Half a unit of the last digit of `reference`; 0 if the value is exact or its text is
+        tip_displacement: Largest displacement (metres) of the tip on the samples if only this cell differs.
+        half_digit: Half a unit of the last digit of `reference`; 0 if the value is exact or its text is
             unknown.
     """
 
@@ -44,8 +44,8 @@ class CellDifference:
     cell: str
     reference: float
     urdf: float
-    tip: float
-    last_digit: float = 0.0
+    tip_displacement: float
+    half_digit: float = 0.0
 
     @property
     def difference(self) -> float:
@@ -53,14 +53,14 @@ class CellDifference:
 
     @property
     def is_rounding(self) -> bool:
-        return abs(self.difference) <= self.last_digit * _HALF
+        return abs(self.difference) <= self.half_digit * _HALF_DIGIT_FACTOR
 
     @property
     def is_length(self) -> bool:
         return self.cell in ("a", "d")
 
-    def formatted(self, value: float, units: Units) -> str:
-        return units.length(value) if self.is_length else units.angle(value)
+    def format_value(self, value: float, units: Units) -> str:
+        return units.format_length(value) if self.is_length else units.format_angle(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class MistakeKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
+class FitChanges:
     """Parameters that a fit must change; `zeros` and `reversed` are numbers of joints."""
 
     base: bool = False
@@ -102,14 +102,14 @@ class Fitted:
 class Mistake:
     """A likely mistake in a table; after the mistake is corrected, a fit changes fewer parameters.
 
-    `table`, `fitted` and the tip errors `metres` and `radians` are those after the correction.
+    `table`, `fit_changes` and the tip errors `metres` and `radians` are those after the correction.
     """
 
     kind: MistakeKind
     rows: tuple[int, ...]
     cell: CellDifference | None
     table: DHTable
-    fitted: Fitted
+    fit_changes: FitChanges
     metres: float
     radians: float
 
@@ -125,12 +125,12 @@ class TableComparison:
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         metres, radians: Largest errors of the fitted table's tip on the samples.
-        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all angles,
-            and for all displacements within limits. A prismatic joint without limits is assumed to be within
+        metres_bound, radians_bound: Proven upper bounds of the errors of the fitted table's tip for all
+            angles, and for all displacements within limits. A prismatic joint without limits is assumed to be
             10 m of zero. The bounds do not include rounding errors.
-        written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
-        instead: The cells that must change so that the table agrees without a fit. Empty if these cells are
-            too many, or if a tip error remains after their correction.
+        unfitted_metres, unfitted_radians: Largest errors of the unfitted table's tip on the samples.
+        unfitted_differences: The cells that must change so that the table agrees without a fit. Empty if
+            these cells are too many, or if a tip error remains after their correction.
         hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
             offsets.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
@@ -139,19 +139,19 @@ class TableComparison:
     reference: DHTable
     reach: float
     travel: float
-    fitted: bool
+    is_fitted: bool
     senses: tuple[int, ...]
     offsets: tuple[float, ...]
     base: AbsorbedOffset
     tool: AbsorbedOffset
     metres: float
     radians: float
-    most_metres: float
-    most_radians: float
-    written_metres: float
-    written_radians: float
+    metres_bound: float
+    radians_bound: float
+    unfitted_metres: float
+    unfitted_radians: float
     differences: tuple[CellDifference, ...]
-    instead: tuple[CellDifference, ...]
+    unfitted_differences: tuple[CellDifference, ...]
     hidden: tuple[tuple[int, str], ...]
     mistakes: tuple[Mistake, ...]
     residual: float
@@ -180,15 +180,15 @@ class TableComparison:
     @property
     def resolution(self) -> float:
         """The power of ten (radians, or metres per metre of reach) to which fitted numbers are rounded."""
-        return resolution(self.metres / self.reach, self.radians)
+        return fit_resolution(self.metres / self.reach, self.radians)
 
     @property
     def exact(self) -> bool:
         """Whether the table is proven to differ from the URDF only by rounding.
 
-        The proof covers the same joint values as `most_metres`.
+        The proof covers the same joint values as `metres_bound`.
         """
-        return self.most_metres <= self.rounding_metres and self.most_radians <= self.rounding
+        return self.metres_bound <= self.rounding_metres and self.radians_bound <= self.rounding
 
     @property
     def condition(self) -> str:
@@ -201,9 +201,9 @@ class TableComparison:
         return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
 
     @property
-    def as_written(self) -> bool:
+    def is_exact_unfitted(self) -> bool:
         """Whether the written table, with its base, tool and zeros, equals the URDF up to rounding."""
-        return self.written_metres <= self.rounding_metres and self.written_radians <= self.rounding
+        return self.unfitted_metres <= self.rounding_metres and self.unfitted_radians <= self.rounding
 
 
 def has_range(limit: Limit | None) -> bool:
@@ -215,40 +215,43 @@ def has_range(limit: Limit | None) -> bool:
     return is_bounded(limit) and limit.lower < limit.upper
 
 
-def resolution(share: float, radians: float) -> float:
+def fit_resolution(relative_error: float, radians: float) -> float:
     """Return the power of ten to which fitted numbers are rounded.
 
-    The result is the smallest power of ten that is at least twice the tip error and at least twice `_FINEST`.
-    `share` is the position error of the tip in metres per metre of reach.
+    The result is the smallest power of ten that is at least twice the tip error and at least twice
+    `_MIN_TIP_ERROR`. `relative_error` is the position error of the tip in metres per metre of reach.
     """
-    return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
+    return float(10.0 ** math.ceil(math.log10(2.0 * max(relative_error, radians, _MIN_TIP_ERROR))))
 
 
-def document(found: TableComparison, units: Units) -> TextDocument:
-    title, *verdict = _verdict(found)
-    parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
-    if found.residual > EXPLAINED * found.reach and not found.mistakes:
+def comparison_document(comparison: TableComparison, units: Units) -> TextDocument:
+    title, *verdict = _verdict_lines(comparison)
+    parts: Parts = [
+        *verdict,
+        *(_mistake_lines(comparison, units) if comparison.mistakes else _cell_parts(comparison, units)),
+    ]
+    if comparison.residual > NEGLIGIBLE_ERROR * comparison.reach and not comparison.mistakes:
         parts.append(
-            f"No change of cells explains the whole difference: {found.residual * 1e3:.3g} mm remain"
+            f"No change of cells explains the whole difference: {comparison.residual * 1e3:.3g} mm remain"
             " unexplained."
         )
-        if not found.fitted:
+        if not comparison.is_fitted:
             parts.append(
                 "The table may have a different base frame or tool. Omit --no-fit to fit base and tool."
             )
-    if found.agrees or not found.mistakes:
-        parts += _fitted(found, units)
-    if not found.agrees:
+    if comparison.agrees or not comparison.mistakes:
+        parts += _fit_parts(comparison, units)
+    if not comparison.agrees:
         parts += ["", str(QuestionsSection.DH_AND_URDF_DISAGREE)]
     return TextDocument(title, parts)
 
 
-def _fitted(found: TableComparison, units: Units) -> Parts:
+def _fit_parts(comparison: TableComparison, units: Units) -> Parts:
     parts: Parts = []
-    table, fine = found.reference, found.resolution
+    table, fine = comparison.reference, comparison.resolution
     variables = [
         f"  {row.joint}: {format_sum('-q' if sense < 0 else 'q', _format_offset(offset, row, fine, units))}"
-        for row, sense, offset in zip(table.rows, found.senses, found.offsets, strict=True)
+        for row, sense, offset in zip(table.rows, comparison.senses, comparison.offsets, strict=True)
         if sense < 0 or abs(offset) > fine
     ]
     if variables:
@@ -260,46 +263,48 @@ def _fitted(found: TableComparison, units: Units) -> Parts:
     return parts
 
 
-def _verdict(found: TableComparison) -> list[str]:
-    table = found.reference
+def _verdict_lines(comparison: TableComparison) -> list[str]:
+    table = comparison.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
-    agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
-    verdict = agrees if found.agrees else "DIFFERS"
-    error = _tip_error(found.metres, found.radians)
-    condition = f", with {found.condition}" if found.condition else ""
+    agrees = "agrees only" if comparison.mistakes else "agrees exactly" if comparison.exact else "agrees"
+    verdict = agrees if comparison.agrees else "DIFFERS"
+    error = _format_tip_error(comparison.metres, comparison.radians)
+    condition = f", with {comparison.condition}" if comparison.condition else ""
     values = f"for all joint values within limits{condition}"
-    proof = f"{found.samples} samples; proven bound {values}: {_proven(found)}"
-    if found.as_written:
+    proof = f"{comparison.samples} samples; proven bound {values}: {_format_bound(comparison)}"
+    if comparison.is_exact_unfitted:
         return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
-    if not found.fitted:
+    if not comparison.is_fitted:
         return [
             f"The table {verdict}: {path}: {error}",
             f"({proof}; base, tool and joint variables are not fitted).",
         ]
-    fine, ends = found.resolution, (found.base, found.tool)
+    fine, ends = comparison.resolution, (comparison.base, comparison.tool)
     changes = [
-        f"{what} by {_errors(end.metres, end.radians)}"
+        f"{what} by {_format_errors(end.metres, end.radians)}"
         for what, end in zip(("the base", "the tool"), ends, strict=True)
-        if end.metres > found.rounding_metres or end.radians > found.rounding
+        if end.metres > comparison.rounding_metres or end.radians > comparison.rounding
     ]
-    zeros = sum(abs(offset) > fine for offset in found.offsets)
-    reversed_ = sum(sense < 0 for sense in found.senses)
+    zeros = sum(abs(offset) > fine for offset in comparison.offsets)
+    reversed_ = sum(sense < 0 for sense in comparison.senses)
     if zeros:
         changes.append(f"the zeros of {zeros} joint{'s' * (zeros > 1)} (listed below)")
     if reversed_:
         s = "s" * (reversed_ > 1)
         changes.append(f"the sign{s} of {reversed_} joint{s} (listed below)")
     after_fit = "after a fit of base, tool and joint offsets"
-    once = f" {after_fit}" if found.agrees and changes else ""
-    fitted = "" if found.agrees else f"; {after_fit}"
+    once = f" {after_fit}" if comparison.agrees and changes else ""
+    fitted = "" if comparison.agrees else f"; {after_fit}"
     lines = [f"The table {verdict}{once}: {path}: {error}", f"({proof}{fitted})."]
-    lines.append(f"Without a fit, {_tip_error(found.written_metres, found.written_radians)}.")
+    lines.append(
+        f"Without a fit, {_format_tip_error(comparison.unfitted_metres, comparison.unfitted_radians)}."
+    )
     if changes:
         lines.append(
             f"The fit changed {', '.join(changes)}. Use --no-fit to compare the table without a fit."
         )
-        both_ends = all(max(end.metres / found.reach, end.radians) > fine for end in ends)
-        if found.agrees and not found.mistakes and (both_ends or zeros or reversed_):
+        both_ends = all(max(end.metres / comparison.reach, end.radians) > fine for end in ends)
+        if comparison.agrees and not comparison.mistakes and (both_ends or zeros or reversed_):
             lines.append(
                 "These changes can hide a wrong sign. To find a wrong sign, write base, tool and zeros"
                 " into the table."
@@ -307,36 +312,42 @@ def _verdict(found: TableComparison) -> list[str]:
     return lines
 
 
-def _errors(metres: float, radians: float) -> str:
+def _format_errors(metres: float, radians: float) -> str:
     return f"{metres * 1e3:.3g} mm and {radians:.3g} rad"
 
 
-def _tip_error(metres: float, radians: float) -> str:
-    return f"the tip is off by up to {_errors(metres, radians)}"
+def _format_tip_error(metres: float, radians: float) -> str:
+    return f"the tip is off by up to {_format_errors(metres, radians)}"
 
 
-def _proven(found: TableComparison) -> str:
-    if found.exact:
+def _format_bound(comparison: TableComparison) -> str:
+    if comparison.exact:
         return "only rounding errors"
-    return "none" if math.isinf(found.most_metres) else _errors(found.most_metres, found.most_radians)
+    return (
+        "none"
+        if math.isinf(comparison.metres_bound)
+        else _format_errors(comparison.metres_bound, comparison.radians_bound)
+    )
 
 
-def _mistakes(found: TableComparison, units: Units) -> list[str]:
-    first = found.mistakes[0]
-    remaining_fit = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
-    subject = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
+def _mistake_lines(comparison: TableComparison, units: Units) -> list[str]:
+    first = comparison.mistakes[0]
+    remaining_fit = (
+        "without a fit" if not first.fit_changes.count else f"after a fit of only {first.fit_changes}"
+    )
+    subject = "One change makes" if len(comparison.mistakes) == 1 else "Each of these changes makes"
     lines = ["", f"{subject} the table right {remaining_fit}:"]
-    for mistake in found.mistakes:
-        error = _tip_error(mistake.metres, mistake.radians)
-        lines.append(f"  {_change(mistake, found.reference, units)}; {error}")
-    if found.agrees:
+    for mistake in comparison.mistakes:
+        error = _format_tip_error(mistake.metres, mistake.radians)
+        lines.append(f"  {_format_correction(mistake, comparison.reference, units)}; {error}")
+    if comparison.agrees:
         lines.append(
             "Correct the table. If the fitted base, tool and zeros are intended, write them into the table."
         )
     return lines
 
 
-def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
+def _format_correction(mistake: Mistake, table: DHTable, units: Units) -> str:
     if mistake.cell is None:
         if mistake.kind is MistakeKind.REVERSED:
             return "the rows in reverse order"
@@ -345,41 +356,47 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
     unit = units.length_name if cell.is_length else units.angle_name
     why = "its sign" if mistake.kind is MistakeKind.SIGN else "a right angle"
     row = f"row {cell.row + 1}, {table.rows[cell.row].joint}"
-    right, wrong = (cell.formatted(value, units) for value in (cell.urdf, cell.reference))
+    right, wrong = (cell.format_value(value, units) for value in (cell.urdf, cell.reference))
     return f"{row}: {cell.cell} = {right} {unit}, not {wrong} ({why})"
 
 
-def _cells(found: TableComparison, units: Units) -> Parts:
+def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
-    if found.differences:
-        parts += ["", f"Cells that differ {unit}:", _table(found.differences, units)]
-        rounded = sum(one.is_rounding for one in found.differences)
+    if comparison.differences:
+        parts += ["", f"Cells that differ {unit}:", _difference_table(comparison.differences, units)]
+        rounded = sum(one.is_rounding for one in comparison.differences)
         if rounded:
-            count = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
+            count = (
+                "All"
+                if rounded == len(comparison.differences)
+                else f"{rounded} of {len(comparison.differences)}"
+            )
             parts.append(f"{count} differences are within the last digit of the table (*).")
-    elif found.as_written:
+    elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
-    elif found.exact:
+    elif comparison.exact:
         parts.append(
             "After the fit of base, tool and joint offsets, every compared cell agrees with the URDF."
         )
-    if found.hidden and not found.as_written:
-        cells = ", ".join(f"{cell}{row + 1}" for row, cell in found.hidden)
+    if comparison.hidden and not comparison.is_exact_unfitted:
+        cells = ", ".join(f"{cell}{row + 1}" for row, cell in comparison.hidden)
         same = "a change of base, tool or joint offsets has the same effect"
         parts.append(f"These cells are not compared, because {same}: {cells}.")
-    if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
+    if {(one.row, one.cell) for one in comparison.unfitted_differences} - {
+        (one.row, one.cell) for one in comparison.differences
+    }:
         parts += ["", f"To agree without a fit, these cells must change {unit}:"]
-        parts.append(_table(found.instead, units))
+        parts.append(_difference_table(comparison.unfitted_differences, units))
     return parts
 
 
-def _table(cells: Sequence[CellDifference], units: Units) -> Table:
+def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
     rows = []
     for one in cells:
-        texts = (one.formatted(value, units) for value in (one.reference, one.urdf, one.difference))
+        texts = (one.format_value(value, units) for value in (one.reference, one.urdf, one.difference))
         name = one.cell + "*" * one.is_rounding
-        rows.append((str(one.row + 1), one.joint, name, *texts, f"{one.tip * 1e3:.3g}"))
+        rows.append((str(one.row + 1), one.joint, name, *texts, f"{one.tip_displacement * 1e3:.3g}"))
     heads = ("row", "joint", "cell", "table", "URDF", "difference", "tip [mm]")
     return Table(heads, rows, left=(1,), names=(1,))
 
@@ -392,6 +409,6 @@ def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:
-        return units.length(round(offset / fine) * fine)
+        return units.format_length(round(offset / fine) * fine)
     twelfth = nearest_twelfth(offset)
-    return units.angle(twelfth if abs(offset - twelfth) <= fine else round(offset / fine) * fine)
+    return units.format_angle(twelfth if abs(offset - twelfth) <= fine else round(offset / fine) * fine)

@@ -15,25 +15,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.common_normals import (
-    LARGEST_HAYATI_TILT,
+    MAX_HAYATI_TILT,
     NEARLY_PARALLEL,
     AxisTransform,
-    shifted_along_z,
-    step_between,
-    tilt_of,
+    find_axis_transform,
+    shift_along_z,
+    tilt_sine,
 )
-from urdfkin.dh.table import DHRow, DHTable, along_axis, angle_difference
+from urdfkin.dh.table import DHRow, DHTable, angle_difference, joint_transform
 from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 
-PATTERNS = 12
-BEAM = 128
+MAX_PATTERNS = 12
+BEAM_WIDTH = 128
 #: Cost (metres) of each joint with sign -1. Among otherwise equal alignments, the URDF's signs cost least.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
-_SLIDING_WEIGHT = 1e-3
+_PRISMATIC_WEIGHT = 1e-3
 #: Below this distance (metres), two axes count as coinciding, so that x can have any direction.
-_NO_OFFSET = 1e-5
+_COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -65,7 +65,7 @@ class _PartialAlignment:
         cost: Sum of the differences between cells (metres); angles are multiplied by the reach.
         offsets: Joint offsets of these joints. The offset of the last of these joints is not yet known.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
-        carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
+        delta_in: Offset along z from the last joint's DH frame to its URDF frame (metres).
         free_offset: Row index and sign of a joint offset that can be chosen freely, because axes coincide.
             The sign is the direction in which this offset rotates x.
     """
@@ -74,12 +74,14 @@ class _PartialAlignment:
     senses: tuple[int, ...]
     offsets: tuple[float, ...]
     phi_in: float
-    carry: float
+    delta_in: float
     base: FloatArray
     free_offset: tuple[int, float] | None = None
 
 
-def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
+def find_sign_fits(
+    chain: FrameChain, reference: DHTable, count: int = MAX_PATTERNS, beam_width: int = BEAM_WIDTH
+) -> list[SignFit]:
     """Return up to `count` alignments of a path with a standard reference table, the closest first.
 
     The table must have the same kinds of joints as the path. With prismatic joints, several combinations of
@@ -95,28 +97,28 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for sense in costs
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
-        partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
+        partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
     # If axes nearly coincide, many directions of x are nearly equivalent.
     # A fit that starts with one of these directions can reach each of the others.
     # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
-    return [_with_tool(partial, chain, reference) for partial in list(by_senses.values())[:count]]
+    return [_make_sign_fit(partial, chain, reference) for partial in list(by_senses.values())[:count]]
 
 
-def _without_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
+def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
     """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
         # A joint offset that can be chosen freely can reverse x. Both directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
-        last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.carry, _DECIMALS)
+        last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
     return list(different.values())
 
 
-def _constant(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
+def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
     """Return the constant pose A_k.
 
     If the joint before or after A_k has sign -1, the z axis of this joint is reversed.
@@ -131,24 +133,24 @@ def _extend(
 ) -> list[_PartialAlignment]:
     """Extend an alignment from joint i to joint i + 1; try both directions of x."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
-    both_turn = turns[i] and turns[i + 1]
-    A = _constant(chain, i + 1, partial.senses[-1], sense)
-    delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
+    both_revolute = turns[i] and turns[i + 1]
+    A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
+    delta = row.d - partial.delta_in if turns[i] and i > 0 else 0.0
     extended = []
-    for step in _steps(A, row, delta, reach, row.theta - partial.phi_in, both_turn):
-        candidate = _with_theta(partial, step, row.theta) if i > 0 and not turns[i] else partial
-        theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
+    for step in _possible_transforms(A, row, delta, reach, row.theta - partial.phi_in, both_revolute):
+        candidate = _adjust_theta(partial, step, row.theta) if i > 0 and not turns[i] else partial
+        theta, d = candidate.phi_in + step.phi, candidate.delta_in + step.delta
         theta_error = angle_difference(theta, row.theta)
         cost = candidate.cost + _REVERSAL_COST * (sense < 0)
         cost += reach * (abs(angle_difference(step.alpha, row.alpha)) + abs(step.beta - row.beta))
-        cost += abs(step.a - row.a) * (1.0 if both_turn else _SLIDING_WEIGHT)
+        cost += abs(step.a - row.a) * (1.0 if both_revolute else _PRISMATIC_WEIGHT)
         if i > 0 and turns[i]:
-            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _SLIDING_WEIGHT)
+            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _PRISMATIC_WEIGHT)
         elif i > 0:
             cost += reach * abs(theta_error)
         offset, base = theta_error if turns[i] else d - row.d, candidate.base
         if i == 0:  # The first row's offset becomes part of the base.
-            base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
+            base, offset = joint_transform(step.phi - row.theta, step.delta - row.d), 0.0
         senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
         free_offset = _free_offset(candidate, step, i, turns[i])
         extended.append(
@@ -168,7 +170,7 @@ def _free_offset(
     return None if partial.free_offset is None else (partial.free_offset[0], sign * partial.free_offset[1])
 
 
-def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
+def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
     """Change the joint offset in `free_offset` so that the row of the last joint has this theta.
 
     The last joint is prismatic.
@@ -179,43 +181,44 @@ def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -
     index, sign = partial.free_offset
     offsets, base = list(partial.offsets), partial.base
     if index == 0:
-        base = base @ along_axis(sign * excess, 0.0)
+        base = base @ joint_transform(sign * excess, 0.0)
     else:
         offsets[index] += sign * excess
     return replace(partial, phi_in=partial.phi_in - excess, offsets=tuple(offsets), base=base)
 
 
-def _steps(
-    A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, both_turn: bool
+def _possible_transforms(
+    A: FloatArray, row: DHRow, delta: float, reach: float, default_phi: float, both_revolute: bool
 ) -> Iterator[AxisTransform]:
     """Yield the possible transforms between two axes, with both directions of x."""
     steps = []
-    sine = tilt_of(A)
-    near = abs(math.sin(row.alpha)) < LARGEST_HAYATI_TILT and sine < LARGEST_HAYATI_TILT
+    sine = tilt_sine(A)
+    near = abs(math.sin(row.alpha)) < MAX_HAYATI_TILT and sine < MAX_HAYATI_TILT
     if not near or row.beta == 0.0:
-        steps.append(step_between(A, reach, phi_free, hayati=False))
+        steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
-        shifted = shifted_along_z(A, -delta)
+        shifted = shift_along_z(A, -delta)
         # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
-        if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
+        if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # `step_between` makes a Hayati row if the common normal is farther than the reach from an origin.
-        # With reach 0, `step_between` makes a Hayati row unless the common normal meets both origins.
+        # `find_axis_transform` makes a Hayati row if the common normal is farther than the reach from an
+        # origin. With reach 0, `find_axis_transform` makes a Hayati row unless the common normal meets both
+        # origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
-        step = step_between(shifted, hayati_reach, phi_free, hayati=True)
+        step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))
     for step in steps:
         yield step
         yield replace(step.with_reversed_x(), phi_is_free=step.phi_is_free)
 
 
-def _with_tool(partial: _PartialAlignment, chain: FrameChain, reference: DHTable) -> SignFit:
+def _make_sign_fit(partial: _PartialAlignment, chain: FrameChain, reference: DHTable) -> SignFit:
     n, last = len(reference.rows), reference.rows[-1]
-    base = _constant(chain, 0, 1, partial.senses[0]) @ partial.base
-    tip = _constant(chain, n, partial.senses[-1], 1)
+    base = _constant_pose(chain, 0, 1, partial.senses[0]) @ partial.base
+    tip = _constant_pose(chain, n, partial.senses[-1], 1)
     if n == 1:
-        base = base @ along_axis(-last.theta, -last.d)
+        base = base @ joint_transform(-last.theta, -last.d)
     else:
-        tip = along_axis(partial.phi_in - last.theta, partial.carry - last.d) @ tip
+        tip = joint_transform(partial.phi_in - last.theta, partial.delta_in - last.d) @ tip
     tool = np.asarray(np.linalg.solve(last.X, tip), np.float64)
     return SignFit(partial.senses, (*partial.offsets, 0.0), base, tool)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
-from urdfkin.system.lazy_import import hook
+from urdfkin.system.lazy_import import get_hook
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
@@ -45,6 +45,6 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
         raise UnknownNameError("format", format, FORMATS)
     module, _ = FORMATS[format]
     if not module:
-        return str(hook("code in a language")(hook("code of a chain")(table, verify=verify), format))
+        return str(get_hook("code in a language")(get_hook("code of a chain")(table, verify=verify), format))
     write = getattr(importlib.import_module(module), "write_" + format.replace("-", "_"))
     return cast("str", write(table, units or Units()) if module == _TEXT else write(table))

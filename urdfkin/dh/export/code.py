@@ -12,18 +12,18 @@ import re
 from fractions import Fraction
 from typing import Any
 
-from urdfkin.dh.export.text import cells, formula
+from urdfkin.dh.export.text import format_cells, formula
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
-from urdfkin.dh.units import COLUMNS, Units, fraction_text, pi_fraction
+from urdfkin.dh.units import COLUMNS, Units, format_pi_fraction, pi_fraction
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import TRAVEL_CONDITION
 from urdfkin.model.tree import FloatArray, is_bounded
 
 
-def identifier(name: str) -> str:
+def make_identifier(name: str) -> str:
     """Return a valid name in C, Python and MATLAB.
 
-    >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
+    >>> make_identifier("ur5 robot"), make_identifier("2dof"), make_identifier("for")
     ('ur5_robot', 'robot_2dof', 'for_')
     """
     word = re.sub(r"[^A-Za-z0-9_]", "_", name) or "robot"
@@ -32,12 +32,12 @@ def identifier(name: str) -> str:
     return f"{word}_" if keyword.iskeyword(word) else word
 
 
-def docstring(table: DHTable) -> list[str]:
-    first, *others = (f"{line}." for line in header(table))
+def docstring_lines(table: DHTable) -> list[str]:
+    first, *others = (f"{line}." for line in header_lines(table))
     return ['"""' + first, "", *others, '"""', ""]
 
 
-def header(table: DHTable) -> list[str]:
+def header_lines(table: DHTable) -> list[str]:
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
@@ -47,15 +47,15 @@ def header(table: DHTable) -> list[str]:
     if table.snap is not None and table.snap.changes:
         condition = f" if {TRAVEL_CONDITION}" if table.unlimited else ""
         lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m{condition}")
-    return [plain(line) for line in lines]
+    return [sanitize(line) for line in lines]
 
 
-def plain(text: str) -> str:
+def sanitize(text: str) -> str:
     """Replace all characters that are not printable ASCII or that could end a comment or a string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
-def numbers(values: FloatArray | list[float]) -> str:
+def format_numbers(values: FloatArray | list[float]) -> str:
     """Format numbers so that a parser reads back the same bits."""
     return ", ".join(repr(float(value)) for value in values)
 
@@ -69,48 +69,53 @@ def check_no_mimic(table: DHTable, what: str) -> None:
         )
 
 
-def bounds(row: DHRow) -> str:
+def format_limits(row: DHRow) -> str:
     """Return the lower and upper limit, separated by a comma; "" if a limit is infinite."""
-    return numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
+    return format_numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
-def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
+def matrix_lines(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
     if not len(rows):
         return [f"{name} = zeros(0, {columns});"]
-    return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
+    return [f"{name} = [", *(f"    {format_numbers(row)}" for row in rows), "];"]
 
 
 #: Fractions with a larger denominator are written as decimals.
-_LARGEST = 10**9
+_MAX_DENOMINATOR = 10**9
 
 
 class Fractions(Units):
     """Format angles as multiples of pi, and lengths as fractions (0.425 is 17/40), in the syntax of SymPy."""
 
-    def length(self, metres: float) -> str:
+    def format_length(self, metres: float) -> str:
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
-        if x.denominator == 1 and x < _LARGEST:
+        if x.denominator == 1 and x < _MAX_DENOMINATOR:
             return f"{sign}{x}"
-        return sign + (self.ratio(x) if x.denominator <= _LARGEST else self.decimal(abs(metres)))
+        return sign + (
+            self.format_ratio(x) if x.denominator <= _MAX_DENOMINATOR else self.format_decimal(abs(metres))
+        )
 
-    def angle(self, radians: float, pi: str = "pi") -> str:
+    def format_angle(self, radians: float, pi: str = "pi") -> str:
         if (fraction := pi_fraction(radians)) is not None:
-            return re.sub(r"(\d)(?=[a-z])", r"\1*", fraction_text(fraction, pi))
-        return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
+            return re.sub(r"(\d)(?=[a-z])", r"\1*", format_pi_fraction(fraction, pi))
+        return ("-" if radians < 0.0 else "") + self.format_decimal(abs(radians))
 
-    def ratio(self, x: Fraction) -> str:
+    def format_ratio(self, x: Fraction) -> str:
         return f"Rational({x.numerator}, {x.denominator})"
 
-    def decimal(self, x: float) -> str:
+    def format_decimal(self, x: float) -> str:
         return repr(x)
 
 
-def columns(table: DHTable) -> str:
+def column_names(table: DHTable) -> str:
     return ", ".join([*COLUMNS, *["beta"] * table.has_hayati_rows])
 
 
-def rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
-    return [", ".join(cells(table, row, number, number=number.length, **style)) for row in table.rows]
+def format_rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
+    return [
+        ", ".join(format_cells(table, row, number, number=number.format_length, **style))
+        for row in table.rows
+    ]
 
 
 _SYMPY = '''from sympy import Matrix, Rational, cos, pi, sin
@@ -149,16 +154,16 @@ def write_sympy(table: DHTable) -> str:
     """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
     number, n = Fractions(), len(table.joint_names)
     base, tool = (
-        "[" + ", ".join(f"[{', '.join(map(number.length, row))}]" for row in T.tolist()) + "]"
+        "[" + ", ".join(f"[{', '.join(map(number.format_length, row))}]" for row in T.tolist()) + "]"
         for T in (table.base, table.tool)
     )
     return (
-        "\n".join(docstring(table))
+        "\n".join(docstring_lines(table))
         + "\n"
         + _SYMPY.format(
-            columns=columns(table),
+            columns=column_names(table),
             names=", ".join(f"q{i}" for i in range(1, n + 1)),
-            rows="\n".join(f"        ({row})," for row in rows(table, number, times=" * ")),
+            rows="\n".join(f"        ({row})," for row in format_rows(table, number, times=" * ")),
             base=base,
             tool=tool,
             formula=formula(table),
@@ -180,26 +185,28 @@ end
 
 
 class _Matlab(Fractions):
-    def ratio(self, x: Fraction) -> str:
+    def format_ratio(self, x: Fraction) -> str:
         return f"sym({x.numerator})/{x.denominator}"
 
-    def decimal(self, x: float) -> str:
+    def format_decimal(self, x: float) -> str:
         return f"vpa('{x!r}')"
 
 
 def write_matlab_symbolic(table: DHTable) -> str:
     """Return a MATLAB file with the function `[T, q] = ROBOT_symbolic()`."""
     number, n = _Matlab(), len(table.joint_names)
-    lines = [f"function [T, q] = {identifier(table.robot)}_symbolic()"]
-    lines += [f"% {line}" for line in header(table)]
+    lines = [f"function [T, q] = {make_identifier(table.robot)}_symbolic()"]
+    lines += [f"% {line}" for line in header_lines(table)]
     names = " ".join(f"q{i}" for i in range(1, n + 1))
     lines += [f"syms {names} real", f"q = [{names.replace(' ', '; ')}];"] if n else ["q = sym(zeros(0, 1));"]
-    cells_of_rows = rows(table, number, pi="sym(pi)", times=" * ")
-    lines += [f"% {columns(table)}", "rows = sym([", *(f"    {row}" for row in cells_of_rows), "]);"]
+    cells_of_rows = format_rows(table, number, pi="sym(pi)", times=" * ")
+    lines += [f"% {column_names(table)}", "rows = sym([", *(f"    {row}" for row in cells_of_rows), "]);"]
     lines.append("one = sym(eye(4));")
     for what, T in (("base", table.base), ("tool", table.tool)):
         entries = [(i, j) for i in range(4) for j in range(4) if T[i, j] != (i == j)]
-        assignments = (f"{what}({i + 1}, {j + 1}) = {number.length(float(T[i, j]))};" for i, j in entries)
+        assignments = (
+            f"{what}({i + 1}, {j + 1}) = {number.format_length(float(T[i, j]))};" for i, j in entries
+        )
         lines.append(" ".join([f"{what} = one;", *assignments]))
     lines += ["T = base;", "for i = 1:size(rows, 1)"]
     lines += ["    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4);"]

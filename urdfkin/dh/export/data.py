@@ -16,7 +16,7 @@ from typing import Any
 
 from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.units import COLUMNS
-from urdfkin.errors.escape import csv_cell, escape
+from urdfkin.errors.escape import csv_cell, escape_sequence
 from urdfkin.model.configuration import TRAVEL_CONDITION
 
 
@@ -89,7 +89,7 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(_value(item) for item in value) + "]"
     # TOML accepts JSON's numbers and escapes, except for surrogate pairs.
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    return "".join(c if c.isprintable() else escape(c) for c in text)
+    return "".join(c if c.isprintable() else escape_sequence(c) for c in text)
 
 
 _CSV_COLUMNS = (

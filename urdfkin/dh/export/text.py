@@ -1,7 +1,7 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, the cells, base and tool. `printed` computes the tip error
-due to the rounding of the printed numbers.
+All formats contain the convention, the formula, the cells, base and tool. `measure_printed_table` computes
+the tip error due to the rounding of the printed numbers.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.snapping import SAMPLES, samples_within_limits
+from urdfkin.dh.snapping import SNAP_SAMPLES, sample_within_limits
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
-from urdfkin.dh.units import Angles, Units
+from urdfkin.dh.units import AngleUnit, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value
@@ -32,7 +32,7 @@ _LATEX_FORMULA = {
 }
 #: A bound is multiplied by this factor, and then rounded up to its last printed digit.
 #: Therefore, a relative rounding error below 1e-12 does not increase this digit.
-_ON_THE_DIGIT = 1.0 - 1e-12
+_ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
@@ -40,7 +40,7 @@ def formula(table: DHTable) -> str:
     return re.sub(r"Rx\(alpha(\S*)\)", r"\g<0> Ry(beta\1)", text) if table.has_hayati_rows else text
 
 
-def variable(
+def format_variable(
     table: DHTable,
     row: DHRow,
     times: str = " ",
@@ -54,7 +54,7 @@ def variable(
     return {1.0: q, -1.0: f"-{q}"}.get(multiplier, f"{number(multiplier)}{times}{q}")
 
 
-def coordinate_names(table: DHTable) -> str:
+def format_coordinate_names(table: DHTable) -> str:
     """Return text such as "with q1 = left, q2 = right" if rows and coordinates differ."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
@@ -73,33 +73,37 @@ def format_sum(variable: str, constant: str) -> str:
     return f"{variable} - {constant[1:]}" if constant.startswith("-") else f"{variable} + {constant}"
 
 
-def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    q = variable(table, row, **style)
+def format_cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
+    q = format_variable(table, row, **style)
     theta_offset, d_offset = _mimic_offsets(row)
-    theta, d = units.angle(row.theta + theta_offset, pi), units.length(row.d + d_offset)
+    theta, d = units.format_angle(row.theta + theta_offset, pi), units.format_length(row.d + d_offset)
     if row.kind.turns:
         theta = format_sum(q, theta)
     else:
         d = format_sum(q, d)
-    a, alpha, beta = units.length(row.a), units.angle(row.alpha, pi), units.angle(row.beta, pi)
+    a, alpha, beta = (
+        units.format_length(row.a),
+        units.format_angle(row.alpha, pi),
+        units.format_angle(row.beta, pi),
+    )
     texts = {"a": a, "alpha": alpha, "d": d, "theta": theta, "beta": beta}
-    return [texts[name] for name in _columns(table, units)]
+    return [texts[name] for name in _column_names(table, units)]
 
 
-def _columns(table: DHTable, units: Units) -> list[str]:
+def _column_names(table: DHTable, units: Units) -> list[str]:
     return [*units.columns, *["beta"] * table.has_hayati_rows]
 
 
 def headings(table: DHTable, units: Units) -> list[str]:
     at = "(i-1)" if table.convention is DHConvention.MODIFIED else ""
     symbols = {"a": f"a{at}", "alpha": f"alpha{at}", "d": "d", "theta": "theta", "beta": f"beta{at}"}
-    return _with_units(table, units, symbols, units.angle_name)
+    return _add_units(table, units, symbols, units.angle_name)
 
 
-def _with_units(table: DHTable, units: Units, symbols: dict[str, str], angle: str) -> list[str]:
+def _add_units(table: DHTable, units: Units, symbols: dict[str, str], angle: str) -> list[str]:
     return [
         f"{symbols[name]} [{units.length_name if name in ('a', 'd') else angle}]"
-        for name in _columns(table, units)
+        for name in _column_names(table, units)
     ]
 
 
@@ -107,16 +111,16 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
     return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
-def at_most(value: float) -> str:
+def format_bound(value: float) -> str:
     """Format a bound with three digits, rounded up so that it remains a bound.
 
-    >>> at_most(7.5912e-06), at_most(0.0)
+    >>> format_bound(7.5912e-06), format_bound(0.0)
     ('7.60e-06', '0')
     """
     if value == 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.ceil(value / unit * _ON_THE_DIGIT) * unit:.2e}"
+    return f"{math.ceil(value / unit * _ROUND_UP_FACTOR) * unit:.2e}"
 
 
 def snap_lines(table: DHTable) -> list[str]:
@@ -125,7 +129,7 @@ def snap_lines(table: DHTable) -> list[str]:
         return []
     if not snap.changes:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
-    metres, radians = at_most(snap.metres), at_most(snap.radians)
+    metres, radians = format_bound(snap.metres), format_bound(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
     condition = f"limits and {TRAVEL_CONDITION}" if table.unlimited else "limits"
     lines = [
@@ -136,17 +140,18 @@ def snap_lines(table: DHTable) -> list[str]:
     for change in snap.changes:
         n = len(table.rows)
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
-        effect = f"turned by {change.angle:.2e} rad, tip moves by at most {at_most(change.tip)} m"
+        displacement = format_bound(change.tip_displacement)
+        effect = f"turned by {change.angle:.2e} rad, tip moves by at most {displacement} m"
         lines.append(f"  {row}: {change.what}, {effect}")
     return lines
 
 
-def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
-    rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
+def table_document(table: DHTable, units: Units, pi: str = "pi", *, wrap: bool = False) -> TextDocument:
+    rows = [(str(i), row.joint, *format_cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
     parts: list[str | Table | Matrix] = [CodeLine(formula(table)), ""]
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
     parts += [] if table.rows else ["(no joint between the two frames moves)"]
-    parts += ["", names] if (names := coordinate_names(table)) else []
+    parts += ["", names] if (names := format_coordinate_names(table)) else []
     for what, T in (("base", table.base), ("tool", table.tool)):
         if not is_identity(T):
             parts += ["", f"{what} (metres):", pose_matrix(T, units.digits)]
@@ -155,7 +160,7 @@ def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = Fa
             parts.append(f"{what}: the identity")
     report = snap_lines(table)
     changes = table.snap.changes if table.snap is not None else ()
-    if not wrapped and changes:
+    if not wrap and changes:
         report = [" ".join(report[: -len(changes)]), *report[-len(changes) :]]
     parts += ["", *report] if report else []
     title = f"{table.robot}: {table.base_frame} to {table.tip_frame}"
@@ -163,33 +168,33 @@ def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = Fa
 
 
 def write_terminal(table: DHTable, units: Units) -> str:
-    return document(table, units, wrapped=True).text() + "\n"
+    return table_document(table, units, wrap=True).text() + "\n"
 
 
 def write_markdown(table: DHTable, units: Units) -> str:
-    return document(table, units).markdown() + "\n"
+    return table_document(table, units).markdown() + "\n"
 
 
 def write_html(table: DHTable, units: Units) -> str:
-    return document(table, units, pi="\u03c0").html() + "\n"
+    return table_document(table, units, pi="\u03c0").html() + "\n"
 
 
 def write_latex(table: DHTable, units: Units) -> str:
     """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
     at = "_{i-1}" if table.convention is DHConvention.MODIFIED else "_i"
-    angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
+    angle = "rad" if units.angles is AngleUnit.RADIANS else r"$^\circ$"
     symbols = {"a": f"$a{at}$", "alpha": rf"$\alpha{at}$", "d": "$d_i$", "theta": r"$\theta_i$"}
     symbols["beta"] = rf"$\beta{at}$"
-    heads = [r"$i$", "joint", *_with_units(table, units, symbols, angle)]
+    heads = [r"$i$", "joint", *_add_units(table, units, symbols, angle)]
     rows = []
     for i, row in enumerate(table.rows, 1):
-        texts = cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")
+        texts = format_cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")
         rows.append([str(i), latex_text(row.joint), *map(latex_math, texts)])
     poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
     frame = [rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}", r"  \toprule"]
     frame += [f"  {' & '.join(heads)} \\\\", r"  \midrule", *(f"  {' & '.join(row)} \\\\" for row in rows)]
     frame += [r"  \bottomrule", r"\end{tabular}"]
-    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *scaled_to_fit(frame)]
+    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *scale_to_fit(frame)]
     lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
@@ -203,29 +208,29 @@ def _caption(table: DHTable) -> str:
     if table.snap is not None and table.snap.changes:
         caption += (
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m"
+            f" which moves the tip by at most {latex_math(format_bound(table.snap.metres))}\\,m"
         )
         caption += f" if {TRAVEL_CONDITION}." if table.unlimited else "."
     return caption
 
 
-def scaled_to_fit(lines: list[str]) -> list[str]:
+def scale_to_fit(lines: list[str]) -> list[str]:
     """Return LaTeX code that scales a wide table down to the width of the text."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 
 
 def latex_pose(what: str, T: FloatArray) -> list[str]:
-    rows = (" & ".join(_with_powers_of_ten(f"{x + 0.0:.6g}") for x in row) for row in T)
+    rows = (" & ".join(_write_powers_of_ten(f"{x + 0.0:.6g}") for x in row) for row in T)
     matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
-    return [r"  \par\medskip", *scaled_to_fit([rf"{what} (m): ${matrix}$"])]
+    return [r"  \par\medskip", *scale_to_fit([rf"{what} (m): ${matrix}$"])]
 
 
 def latex_math(text: str) -> str:
-    return f"${_with_powers_of_ten(text)}$"
+    return f"${_write_powers_of_ten(text)}$"
 
 
-def _with_powers_of_ten(text: str) -> str:
+def _write_powers_of_ten(text: str) -> str:
     """Write numbers such as 1e-6 as powers of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)
 
@@ -248,43 +253,43 @@ class PrintedPrecision:
     unlimited: bool = False
 
     def __str__(self) -> str:
-        proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
+        proven = "" if self.bound is None else f"; the proven bound is {format_bound(self.bound)} m"
         condition = f"; this holds if {TRAVEL_CONDITION}" if self.unlimited else ""
         return (
-            f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
+            f"printed with {self.digits} digits, the table gives the tip within {format_bound(self.metres)} m"
             f" of its exact position on {self.samples} samples{proven}{condition}"
         )
 
 
-def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
+def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
     """Return the tip error of a printed table with `pose_digits` significant digits in base and tool."""
-    rows = tuple(_printed_row(row, units) for row in table.rows)
-    base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
-    q = samples_within_limits(table)
+    rows = tuple(_round_row(row, units) for row in table.rows)
+    base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
+    q = sample_within_limits(table)
     # DHTable rejects coarsely rounded rotations, so the printed base and tool are multiplied separately.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
-    bound = _printed_bound(table, rows, base, tool)
+    bound = _bound_tip_error(table, rows, base, tool)
     finite_bound = bound if math.isfinite(bound) else None
     measured, unlimited = float(distances.max(initial=0.0)), bool(table.unlimited)
-    return PrintedPrecision(units.digits, measured, finite_bound, SAMPLES, unlimited)
+    return PrintedPrecision(units.digits, measured, finite_bound, SNAP_SAMPLES, unlimited)
 
 
-def _printed_row(row: DHRow, units: Units) -> DHRow:
+def _round_row(row: DHRow, units: Units) -> DHRow:
     rule = row.mimic
     theta_offset, d_offset = _mimic_offsets(row)
     return replace(
         row,
-        a=units.printed_length(row.a),
-        alpha=units.printed_angle(row.alpha),
-        d=units.printed_length(row.d + d_offset) - d_offset,
-        theta=units.printed_angle(row.theta + theta_offset) - theta_offset,
-        beta=units.printed_angle(row.beta),
+        a=units.round_length(row.a),
+        alpha=units.round_angle(row.alpha),
+        d=units.round_length(row.d + d_offset) - d_offset,
+        theta=units.round_angle(row.theta + theta_offset) - theta_offset,
+        beta=units.round_angle(row.beta),
         mimic=rule and replace(rule, multiplier=float(f"{rule.multiplier:.10g}")),
     )
 
 
-def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
+def _round_pose(T: FloatArray, digits: int) -> FloatArray:
     return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
 
 
@@ -302,7 +307,7 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
     return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)
 
 
-def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
+def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
 
     The rounding error of an angle moves the tip by at most this error times `lever`. The length `lever` is an

@@ -18,20 +18,20 @@ from collections.abc import Callable
 
 from urdfkin.dh.convert import frame_poses
 from urdfkin.dh.export.code import (
-    bounds,
     check_no_mimic,
-    docstring,
-    header,
-    identifier,
-    matrix,
-    numbers,
-    plain,
+    docstring_lines,
+    format_limits,
+    format_numbers,
+    header_lines,
+    make_identifier,
+    matrix_lines,
+    sanitize,
 )
-from urdfkin.dh.export.text import latex_math, latex_pose, scaled_to_fit
+from urdfkin.dh.export.text import latex_math, latex_pose, scale_to_fit
 from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.structure import axes_and_vectors
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
-from urdfkin.errors.display import six_digits
+from urdfkin.errors.display import format_number
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
@@ -41,16 +41,16 @@ def write_roboticstoolbox(table: DHTable) -> str:
     if table.has_hayati_rows or not table.rows:
         return write_ets(table)
     check_no_mimic(table, "DHRobot")
-    lines = docstring(table)
+    lines = docstring_lines(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "", "robot = rtb.DHRobot(", "    ["]
-    lines += [f"        {_link(row, table.convention)}," for row in table.rows]
-    lines += ["    ],", f'    name="{plain(table.robot)}",']
+    lines += [f"        {_link_code(row, table.convention)}," for row in table.rows]
+    lines += ["    ],", f'    name="{sanitize(table.robot)}",']
     for what, T in (("base", table.base), ("tool", table.tool)):
-        lines.append(f"    {what}=np.array([{numbers(T.ravel())}]).reshape(4, 4),")
+        lines.append(f"    {what}=np.array([{format_numbers(T.ravel())}]).reshape(4, 4),")
     return "\n".join([*lines, ")"]) + "\n"
 
 
-def _link(row: DHRow, convention: DHConvention) -> str:
+def _link_code(row: DHRow, convention: DHConvention) -> str:
     suffix = "DH" if convention is DHConvention.STANDARD else "MDH"
     kind, constant, offset = (
         ("Revolute", f"d={row.d!r}", row.theta)
@@ -65,23 +65,32 @@ def write_matlab_rst(table: DHTable) -> str:
     """Return a function file `ROBOT_tree.m`; its function returns a rigidBodyTree."""
     check_no_mimic(table, "rigidBodyTree")
     poses = frame_poses(table)
-    lines = [f"function robot = {identifier(table.robot)}_tree()", *(f"% {line}" for line in header(table))]
-    lines += ["robot = rigidBodyTree('DataFormat', 'row');", f"robot.BaseName = '{plain(table.base_frame)}';"]
+    lines = [
+        f"function robot = {make_identifier(table.robot)}_tree()",
+        *(f"% {line}" for line in header_lines(table)),
+    ]
+    lines += [
+        "robot = rigidBodyTree('DataFormat', 'row');",
+        f"robot.BaseName = '{sanitize(table.base_frame)}';",
+    ]
     parent = "robot.BaseName"
     for row, T in zip(table.rows, poses[:-1], strict=True):
         kind = "revolute" if row.kind.turns else "prismatic"
-        lines += matrix("T", T.tolist(), 4)
+        lines += matrix_lines("T", T.tolist(), 4)
         lines += [
-            f"body = rigidBody('{plain(row.joint)}_link');",
-            f"joint = rigidBodyJoint('{plain(row.joint)}', '{kind}');",
+            f"body = rigidBody('{sanitize(row.joint)}_link');",
+            f"joint = rigidBodyJoint('{sanitize(row.joint)}', '{kind}');",
             "setFixedTransform(joint, T);",
             f"joint.JointAxis = [0 0 {row.sense}];",
         ]
-        if limits := bounds(row):
+        if limits := format_limits(row):
             lines.append(f"joint.PositionLimits = [{limits}];")
         lines += ["body.Joint = joint;", f"addBody(robot, body, {parent});"]
-        parent = f"'{plain(row.joint)}_link'"
-    lines += [*matrix("T", poses[-1].tolist(), 4), f"body = rigidBody('{plain(table.tip_frame)}_tip');"]
+        parent = f"'{sanitize(row.joint)}_link'"
+    lines += [
+        *matrix_lines("T", poses[-1].tolist(), 4),
+        f"body = rigidBody('{sanitize(table.tip_frame)}_tip');",
+    ]
     lines += ["setFixedTransform(body.Joint, T);", f"addBody(robot, body, {parent});", "end"]
     return "\n".join(lines) + "\n"
 
@@ -89,22 +98,28 @@ def write_matlab_rst(table: DHTable) -> str:
 def write_ets(table: DHTable) -> str:
     """Return a module with the transforms `ets` and the `robot`; raise InputError for a mimic joint."""
     check_no_mimic(table, "a sequence of elementary transforms")
-    lines = docstring(table)
+    lines = docstring_lines(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
-    lines += ["ets = rtb.ETS(", "    [", *_pose(table.base, always=not table.rows)]
+    lines += ["ets = rtb.ETS(", "    [", *_pose_transform(table.base, always=not table.rows)]
     lines += [
-        f"        {', '.join(_row(row, table.convention))},  # {plain(row.joint)}" for row in table.rows
+        f"        {', '.join(_row_transforms(row, table.convention))},  # {sanitize(row.joint)}"
+        for row in table.rows
     ]
-    lines += [*_pose(table.tool), "    ]", ")", f'robot = rtb.Robot(ets, name="{plain(table.robot)}")']
+    lines += [
+        *_pose_transform(table.tool),
+        "    ]",
+        ")",
+        f'robot = rtb.Robot(ets, name="{sanitize(table.robot)}")',
+    ]
     return "\n".join(lines) + "\n"
 
 
 def _sense_and_limits(row: DHRow) -> list[str]:
-    limits = bounds(row)
+    limits = format_limits(row)
     return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
 
 
-def _row(row: DHRow, convention: DHConvention) -> list[str]:
+def _row_transforms(row: DHRow, convention: DHConvention) -> list[str]:
     variable = ", ".join(_sense_and_limits(row))
     S = _transform("Rz", row.theta)
     S += [f"ET.Rz({variable})"] * row.kind.turns
@@ -118,10 +133,10 @@ def _transform(name: str, value: float) -> list[str]:
     return [f"ET.{name}({value!r})"] if value else []
 
 
-def _pose(T: FloatArray, *, always: bool = False) -> list[str]:
+def _pose_transform(T: FloatArray, *, always: bool = False) -> list[str]:
     if is_identity(T) and not always:
         return []
-    return [f"        ET.SE3(np.array([{numbers(T.ravel())}]).reshape(4, 4)),"]
+    return [f"        ET.SE3(np.array([{format_numbers(T.ravel())}]).reshape(4, 4)),"]
 
 
 def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
@@ -130,7 +145,7 @@ def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> 
         return _latex(screws, digits)
     if form in _EXACT_FORMS:
         return _EXACT_FORMS[form](screws)
-    return screws_document(screws, digits).written(form)
+    return screws_document(screws, digits).render(form)
 
 
 def _latex(screws: ProductOfExponentials, digits: int) -> str:
@@ -138,18 +153,17 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
     heads = r"$i$ & joint & $\omega_x$ & $\omega_y$ & $\omega_z$ & $v_x$ & $v_y$ & $v_z$ \\"
     rows = []
     for i, (joint, row) in enumerate(zip(screws.joints, screws.space, strict=True), 1):
-        cells = " & ".join(latex_math(six_digits(x, digits=min(digits, 6))) for x in row)
+        cells = " & ".join(latex_math(format_number(x, digits=min(digits, 6))) for x in row)
         rows.append(rf"  {i} & {latex_text(joint.name)} & {cells} \\")
     frame = [r"\begin{tabular}{rlrrrrrr}", r"  \toprule", f"  {heads}", r"  \midrule"]
     lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
-    lines += scaled_to_fit([*frame, *rows, r"  \bottomrule", r"\end{tabular}"])
+    lines += scale_to_fit([*frame, *rows, r"  \bottomrule", r"\end{tabular}"])
     return "\n".join([*lines, *latex_pose("$M$", screws.M), r"\end{table}"]) + "\n"
 
 
 def _numpy(screws: ProductOfExponentials) -> str:
-    lines = [
-        f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
-    ]
+    title = f"{sanitize(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."
+    lines = [f'"""{title}"""']
     lines += ["", "import numpy as np", ""]
     for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
         lines += _array(name, rows, ")" if name == "M" else ").reshape(-1, 6).T")
@@ -167,15 +181,21 @@ def _numpy(screws: ProductOfExponentials) -> str:
 
 
 def _array(name: str, rows: FloatArray, end: str) -> list[str]:
-    return [f"{name} = np.array(", "    [", *(f"        [{numbers(row)}]," for row in rows), "    ]", end]
+    return [
+        f"{name} = np.array(",
+        "    [",
+        *(f"        [{format_numbers(row)}]," for row in rows),
+        "    ]",
+        end,
+    ]
 
 
 def _matlab(screws: ProductOfExponentials) -> str:
-    lines = [f"function [M, Slist, Blist] = {identifier(screws.robot)}_screws()"]
-    lines += [f"% {plain(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
-    lines += matrix("M", screws.M, 4)
+    lines = [f"function [M, Slist, Blist] = {make_identifier(screws.robot)}_screws()"]
+    lines += [f"% {sanitize(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
+    lines += matrix_lines("M", screws.M, 4)
     for name, rows in (("Slist", screws.space), ("Blist", screws.body)):
-        lines += [*matrix(name, rows, 6), f"{name} = {name}';"]
+        lines += [*matrix_lines(name, rows, 6), f"{name} = {name}';"]
     return "\n".join([*lines, "end"]) + "\n"
 
 

@@ -32,7 +32,7 @@ from typing import Any
 
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.validators import is_real, safe_repr
-from urdfkin.system.files import exists, read_text, shortened
+from urdfkin.system.files import exists, read_text, shorten_path
 
 #: Factors that convert rad or m to each unit.
 _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "mm": 1000.0}
@@ -145,7 +145,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
         return known
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
-        return parse_convention(read_text(path), shortened(path), path.stem)
+        return parse_convention(read_text(path), shorten_path(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
     error.remedy = f"{error.remedy} {names}"

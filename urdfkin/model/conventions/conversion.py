@@ -23,7 +23,7 @@ from urdfkin.model import configuration
 from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
 from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.plain_xml import parse_xml
 
 #: Largest allowed difference (rad or m) between a mimic joint's value and the value from its mimic rule.
 _MIMIC_TOLERANCE = 1e-9
@@ -159,7 +159,7 @@ class Conversion:
         if order == "depth first, by name":
             return list(all_joints)
         tag = "link" if order.endswith("link") else "joint"
-        written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
+        written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
         # The file does not contain a root joint that urdfkin added; the place -1 puts this joint first.
         ranks = [written.get(name, -1) for name in names]
@@ -285,7 +285,7 @@ class Conversion:
 
     def _centre_of_mass(self, link: str) -> FloatArray:
         """Return the centre of mass (3,) in the link's frame, from the URDF text."""
-        for element in plain_xml(self._urdf).iterfind("link"):
+        for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
         return np.zeros(3)

@@ -19,7 +19,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors import QuestionsSection, UnknownNameError
-from urdfkin.errors.escape import printable
+from urdfkin.errors.escape import escape_unprintable
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import Rule
 from urdfkin.urdf.lint.rules import bodies, dialect, joints, left_out
@@ -159,7 +159,7 @@ def explain(rule: Rule) -> str:
 
 
 def _example(text: str) -> str:
-    lines = [printable(line) for line in text.strip("\n").split("\n")]
+    lines = [escape_unprintable(line) for line in text.strip("\n").split("\n")]
     cut = [
         line if len(line) <= _MAX_EXAMPLE_WIDTH else line[: _MAX_EXAMPLE_WIDTH - 4] + " ..." for line in lines
     ]

@@ -29,7 +29,7 @@ from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.system.files import exists, is_folder, read_text
-from urdfkin.system.git import Version
+from urdfkin.system.git import CommitFiles
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
 from urdfkin.urdf.lint.pages import find_rules
@@ -262,7 +262,7 @@ class FindingFilter:
 
 
 def find_known_findings(
-    text: UrdfText, version: Version, examine: Callable[[UrdfText], Examination]
+    text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
@@ -276,11 +276,11 @@ def find_known_findings(
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
         # every finding is new.
-        return Baseline(Counter()) if version.changed(_INCLUDABLE_SUFFIXES) else None
-    is_unchanged = version.holds(text.data)
-    old_data = text.data if is_unchanged else version.read(path)
+        return Baseline(Counter()) if version.has_changes(_INCLUDABLE_SUFFIXES) else None
+    is_unchanged = version.contains(text.data)
+    old_data = text.data if is_unchanged else version.read_file(path)
     findings = () if old_data is None else examine(replace(text, data=old_data)).findings
-    if any(os.fsencode(name) in text.data for name in version.gone):
+    if any(os.fsencode(name) in text.data for name in version.missing_names):
         findings = tuple(finding for finding in findings if finding.code != MESH_MISSING.id)
     elif is_unchanged:
         return None

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import log_line
-from urdfkin.errors.validators import as_str, whole_number
+from urdfkin.errors.validators import as_int, as_str
 from urdfkin.kinematics.inputs import as_floats
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration import parse_finite
@@ -135,7 +135,7 @@ def enclose(
 ) -> Enclosures:
     """Return intervals that contain the true results of one frame for one sample."""
     if digits is not None:
-        digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
+        digits = as_int(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
     tree = verifier.tree
     call = Call(tree, plan_of, as_str(frame, "frame"), reference, base, inputs)
     if call.shape:

@@ -26,8 +26,8 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock
-from urdfkin.system.locks import lock_over_forks
-from urdfkin.system.plain_xml import plain_xml
+from urdfkin.system.locks import make_fork_safe_lock
+from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
 #: Least number of decimal digits in the accuracy study.
@@ -47,7 +47,7 @@ _ALL_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _SPARE = 30
 
-_ONE_THREAD = lock_over_forks()
+_ONE_THREAD = make_fork_safe_lock()
 
 
 def enough_digits(joints: int) -> int:
@@ -227,7 +227,7 @@ def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArra
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = BALLS) -> None:
         self.kind = kind
-        root = plain_xml(text)
+        root = parse_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
         self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
 

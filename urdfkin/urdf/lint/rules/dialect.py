@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import (
     DIFFERS,
@@ -92,7 +92,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
 
 
 _EXPAND_REMEDY = (
-    f"expand the file first: xacro FILE > robot.urdf, or {install_remedy('xacro')} and pass the .xacro file"
+    f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
 #: An element, and the name of one of its attributes or None.
