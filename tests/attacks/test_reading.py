@@ -133,7 +133,7 @@ def test_files_of_a_store_that_are_links_to_a_device_are_not_read(tmp_path: Path
     validate("planar_two_link", samples=10, store=tmp_path)
     messages: list[str] = []
     (tmp_path / "accuracy.json").symlink_to("/dev/zero")
-    assert AccuracyStore.open(Store.open_read_only(tmp_path, messages.append)) is None
+    assert AccuracyStore.from_store(Store.open_read_only(tmp_path, messages.append)) is None
     assert "no accuracy results" in messages[0]
     (chunk,) = tmp_path.glob("chunks/*/*.chunk")
     chunk.unlink()

@@ -208,7 +208,7 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
-    if (results := AccuracyStore.open(store)) is not None:
+    if (results := AccuracyStore.from_store(store)) is not None:
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {format_count(len(robots), 'robot')} done")
 
 

@@ -220,7 +220,7 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    if (results := AccuracyStore.open(store)) is None:
+    if (results := AccuracyStore.from_store(store)) is None:
         return (), True
     studies = [results.read(i) for i, report in enumerate(reports) if report.error_stats]
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies

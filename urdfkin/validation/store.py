@@ -457,10 +457,10 @@ class AccuracyStore:
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        theirs = [results for results in map(cls.open, others) if results is not None]
+        theirs = [results for results in map(cls.from_store, others) if results is not None]
         if not theirs:
             return
-        own = cls.open(store) or cls(store, theirs[0]._settings)
+        own = cls.from_store(store) or cls(store, theirs[0]._settings)
         for results in theirs:
             own._check_same(results)
         own.write_settings()
@@ -470,7 +470,7 @@ class AccuracyStore:
                     own.write(robot, study)
 
     @classmethod
-    def open(cls, store: Store) -> AccuracyStore | None:
+    def from_store(cls, store: Store) -> AccuracyStore | None:
         """Return the results in a store; None if there are none, or the settings are unreadable."""
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
