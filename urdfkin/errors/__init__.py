@@ -23,19 +23,21 @@ _OFFERED = 3
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
-    """Return up to three known names that look like `word`, the most similar first.
+    """Return up to three known names that look like `word` in any case, the most similar first.
 
     `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
     `work` compared pairs of characters.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
+    >>> nearest("UR5", ["ur5", "panda"])
+    ['ur5']
     """
-    prefix = word[:_COMPARED]
+    prefix = word[:_COMPARED].lower()
     matcher = difflib.SequenceMatcher(b=prefix)
     found = []
     for name in known:
-        matcher.set_seq1(name[:_COMPARED])
+        matcher.set_seq1(name[:_COMPARED].lower())
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
         work -= len(prefix) * len(name[:_COMPARED])
