@@ -369,7 +369,7 @@ class _MimicChecker:
             return
         leader = self.joints.get(mimic.leader)
         if leader is None:
-            self.unknown(mimic)
+            self.unknown(joint, mimic)
         elif joint.name in self.in_loops:
             itself = leader is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
@@ -381,8 +381,9 @@ class _MimicChecker:
         else:
             self.check_sound(joint, mimic, leader)
 
-    def unknown(self, mimic: MimicRecord) -> None:
-        nearest = self.report.nearest(mimic.leader, self.joints)
+    def unknown(self, joint: JointRecord, mimic: MimicRecord) -> None:
+        others = (name for name in self.joints if name != joint.name)
+        nearest = self.report.nearest(mimic.leader, others)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
