@@ -29,7 +29,9 @@ def test_an_exported_file_is_written_and_passes_the_check(tmp_path: Path) -> Non
 def test_the_suffix_of_the_output_selects_the_language(suffix: str, words: str, tmp_path: Path) -> None:
     path = tmp_path / f"elbow.{suffix}"
     good("export planar_two_link --quantity jacobian -o", str(path))
-    assert words in path.read_text("utf-8")
+    text = path.read_text("utf-8")
+    assert words in text
+    assert re.search(rf"To try it: .* elbow\.{suffix}( |$)", text, re.MULTILINE), "the command names this file"
     good("export planar_two_link --quantity jacobian --to latex -o", str(path))
     assert words not in path.read_text("utf-8")
 

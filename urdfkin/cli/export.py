@@ -126,7 +126,7 @@ def export_command(
     names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
     code = code_in(code_of_robot(loaded, frame, names, reference, form, name=name, verify=verify), to)
-    write_output(write(code, to), output)
+    write_output(write(code, to, None if output is None else output.name), output)
     proof = code.proof
     say(check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:
