@@ -31,7 +31,9 @@ def test_the_suffix_of_the_output_selects_the_language(suffix: str, words: str, 
     good("export planar_two_link --quantity jacobian -o", str(path))
     text = path.read_text("utf-8")
     assert words in text
-    assert re.search(rf"To try it: .* elbow\.{suffix}( |$)", text, re.MULTILINE), "the command names this file"
+    assert re.search(rf"To try it: .* elbow\.{suffix}( |$)", text, re.MULTILINE), (
+        "the command names this file"
+    )
     good("export planar_two_link --quantity jacobian --to latex -o", str(path))
     assert words not in path.read_text("utf-8")
 
