@@ -278,7 +278,8 @@ def test_all_output_of_the_command_line_passes_the_safe_stream() -> None:
         "streams.py": ("click.echo(escape_unprintable(line)",),
         "explain.py": (
             "click.echo(equation)", "click.echo(format_answer(", "click.echo(explain(",
-            'click.echo(f"{rule.id}', 'click.echo(f"questions: ',
+            'click.echo(f"{rule.id}', 'click.echo(f"questions: ', 'click.echo(f"equations ',
+            'click.echo("\\n".join(lines))',
         ),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
         "options.py": ("click.echo(getattr(importlib.import_module(module), name).schema_text()",),

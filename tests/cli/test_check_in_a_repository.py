@@ -507,6 +507,14 @@ def test_fix_corrects_files_and_reports_the_remaining_findings(here: Path) -> No
     assert (arm.stat().st_mtime_ns, arm.stat().st_ino) == before
 
 
+def test_the_hint_about_fixes_states_that_a_file_with_an_error_is_not_changed(here: Path) -> None:
+    hint = "[*] --fix fixes these findings; "
+    put("arm.urdf")
+    assert f"{hint}--diff prints the changes" in check("--strict").text
+    put("arm.urdf", LONG.replace('link="b"', 'link="c"'))
+    assert f"{hint}correct the errors of a file first" in check().text
+
+
 def test_only_reported_findings_are_fixed(here: Path) -> None:
     text = LONG.replace("<parent", '<parent frame="x"')
     mended = text.replace("0 0 2", "0 0 1")

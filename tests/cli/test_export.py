@@ -25,6 +25,19 @@ def test_an_exported_file_is_written_and_passes_the_check(tmp_path: Path) -> Non
     assert (wrong.code, "WRONG placement" in wrong.text) == (1, True)
 
 
+@pytest.mark.parametrize(("suffix", "words"), [("hpp", "namespace "), ("py", "import numpy"), ("c", "void ")])
+def test_the_suffix_of_the_output_selects_the_language(suffix: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / f"elbow.{suffix}"
+    good("export planar_two_link --quantity jacobian -o", str(path))
+    text = path.read_text("utf-8")
+    assert words in text
+    assert re.search(rf"To try it: .* elbow\.{suffix}( |$)", text, re.MULTILINE), (
+        "the command names this file"
+    )
+    good("export planar_two_link --quantity jacobian --to latex -o", str(path))
+    assert words not in path.read_text("utf-8")
+
+
 def test_an_export_on_standard_output_contains_no_log_command() -> None:
     done = good("export planar_two_link --to c --name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text

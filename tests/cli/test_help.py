@@ -111,11 +111,17 @@ def test_help_needs_less_than_600_milliseconds() -> None:
     assert min(processor_seconds() for _ in range(3)) < 0.6  # measured: 0.06 s
 
 
+def test_the_command_without_arguments_prints_the_help() -> None:
+    done = urdfkin()
+    assert (done.code, done.out) == (2, b"")
+    assert done.err == urdfkin("--help").text
+
+
 def test_synonyms_lead_to_commands_and_commands_have_the_names_of_the_library() -> None:
     assert set(_SYNONYMS) & set(commands()) == set()
     assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
     for meant in _SYNONYMS.values():
-        assert meant.split()[0] in commands()
+        assert meant.split()[0] in {*commands(), "--help", "--version"}
     own = set(groups()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
     assert [name for name in own if not hasattr(Robot, name.replace("-", "_"))] == []
     functions = "same", "diff", "calibrate", "validate", "check"
@@ -128,3 +134,18 @@ def test_explain_prints_the_page_of_an_equation_and_refuses_other_numbers() -> N
         assert part in page
     assert "page 2" in urdfkin("explain 7.8").text
     refused("explain 7.131")
+
+
+def test_explain_lists_the_codes_and_equations_whose_description_has_a_word() -> None:
+    found = [line.split()[0] for line in good("explain Jacobian").text.splitlines()]
+    assert {"7.85", "7.126"} < set(found)
+    assert {"URDF506", "URDF527"} < {line.split()[0] for line in good("explain limit").text.splitlines()}
+    assert good("explain 'transverse coriolis'").text.startswith("7.130 ")
+    assert "did you mean" in refused("explain roundedpi")
+    refused("explain 7")
+
+
+def test_explain_without_an_argument_lists_all_sections_with_equations() -> None:
+    lines = good("explain").text.splitlines()
+    assert "equations 7.1 to 7.7: Planar motion of objects" in lines
+    assert any(line.startswith("equations ") and "to 7.130:" in line for line in lines)

@@ -165,3 +165,13 @@ def test_a_wrong_axis_or_origin_of_a_chain_is_a_disagreement(
 def test_a_chain_of_a_batch_or_of_a_floating_joint_is_refused() -> None:
     assert "the chain needs exactly one configuration" in refused("chain ur5 --q random:2")
     assert "a floating joint has no single axis" in refused("chain a1 --root-joint floating --base universe")
+
+
+def test_a_command_prints_the_warnings_of_a_file_that_concern_its_kinematics() -> None:
+    body = '<inertial><mass value="1"/><inertia ixx="9" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    axle = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>'
+    text = f'<robot name="r"><link name="a">{body}</link><link name="b"/>{axle}</robot>'
+    err = urdfkin("info -", stdin=text).err
+    assert "URDF503 warning" in err
+    assert "URDF702" not in err
+    assert "URDF702 warning" in urdfkin("check -", stdin=text).text

@@ -16,6 +16,9 @@ ZEROS = "0,0,0,-1,0,0,0,0"
 
 #: For each wrong command line, a part of the message
 MISTAKES = {
+    "completion": "Choose from: bash, zsh, fish; see: urdfkin completion --help",
+    "help": "unknown command 'help'; did you mean --help?",
+    "info UR5": "unknown robot 'UR5'; did you mean ur5",
     "jacobian pandaa": "unknown robot 'pandaa'; did you mean panda",
     "info ./nowhere.urdf": "nowhere.urdf: no such file",
     "info nowhere/arm.urdf": "no such file; the folder nowhere does not exist",

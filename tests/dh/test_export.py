@@ -185,6 +185,8 @@ def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None
         assert name in written
     assert written.count("x") >= 4
     assert written.count("z") >= 4
+    backgrounds = [node for node in root.iter() if "opacity: 0.75" in node.get("style", "")]
+    assert len(backgrounds) >= 7, "a label is legible above a line"
 
 
 @pytest.mark.slow

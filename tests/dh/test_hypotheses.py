@@ -119,6 +119,12 @@ def test_a_comparison_names_the_fitting_interpretation_and_exits_with_1(tmp_path
     file.write_text('convention = "standard"\n' + text)
     words = "more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees"
     assert re.search(words, refused("dh", *UR5, "--compare", str(file)))
+    # A variable in the column theta must not prevent the hint.
+    lines = [",".join(map(str, [*row, f"q{k}"])) for k, row in enumerate(rows, 1)]
+    for convention in ("convention: standard\n", ""):
+        file = tmp_path / "ur5.csv"
+        file.write_text(f"{convention}a,alpha,d,theta\n" + "\n".join(lines))
+        assert re.search(words, refused("dh", *UR5, "--compare", str(file)))
 
 
 def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:

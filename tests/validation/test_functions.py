@@ -359,6 +359,7 @@ def test_a_wrong_argument_is_an_error(arguments: dict[str, Any], words: str) -> 
         (lambda J: J + 1j, "complex128, expected real numbers"),
         (lambda J: J.astype(str), "expected real numbers"),
         (lambda J: np.ma.masked_array(J, True), "a masked array"),
+        (lambda J: None, "the function returns None; is `return` missing?"),
     ],
 )
 def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, words: str) -> None:
@@ -378,6 +379,16 @@ def test_a_mistake_that_leaves_two_percent_of_the_difference_is_not_reported() -
 
     found = verify_function(at_the_arm, robot, "placement", frame="at_1")
     assert found.diagnoses == ("the function returns the result of the frame 'arm' instead of 'at_1'",)
+
+
+def test_equal_messages_share_a_line_and_a_transposed_result_is_named() -> None:
+    found = verify_function(lambda q: np.zeros((2, 6)), urdfkin.load("planar_two_link"), samples=7)
+    lines = str(found).splitlines()
+    assert lines[2:] == [
+        "10 configurations without a usable result; the first ones:",
+        "  samples 0, 1, 2, 3, 4: shape (2, 6), expected (6, 2)",
+        "Diagnosis: the result is transposed: its shape is (2, 6) in place of (6, 2).",
+    ]
 
 
 def test_a_function_that_only_raises_exceptions_has_no_diagnosis() -> None:

@@ -107,6 +107,8 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
 #: Commands that error messages suggest. Each value lists the unknown commands for a suggestion.
 _SYNONYMS = _by_word(
     {
+        "--help": "help usage man",
+        "--version": "version",
         "placement": "fk forward forward-kinematics pose transform tf",
         "placement --relative-to FRAME": "relative-placement relative-pose",
         "placement --as rpy or --as quaternion": "rpy quaternion",

@@ -68,6 +68,7 @@ class CheckOutcome:
         known_count: Number of findings that the baseline file suppresses.
         obsolete_count: Number of entries of the baseline file that no longer have a finding.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
+        with_error: Files with an error. --fix does not change them. A warning with --strict is no error.
     """
 
     files: list[str] = field(default_factory=list)
@@ -81,6 +82,7 @@ class CheckOutcome:
     fixable_count: int = 0
     patches: list[str] = field(default_factory=list)
     unsafe_count: int = 0
+    with_error: set[str] = field(default_factory=set)
 
     def add(self, file: str, found: Examination) -> None:
         formatter = ExcerptFormatter(found.data)
@@ -121,7 +123,9 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
     fixes = [finding.fix for finding in outcome.findings if finding.fix]
     unsafe = sum(not fix.is_safe for fix in fixes)
     if len(fixes) > unsafe:
-        say("[*] --fix fixes these findings; --diff prints the changes")
+        refused = any(finding.fix and finding.file in outcome.with_error for finding in outcome.findings)
+        note = "correct the errors of a file first" if refused else "--diff prints the changes"
+        say(f"[*] --fix fixes these findings; {note}")
     if unsafe:
         also = f"--unsafe-fixes also fixes {format_count(unsafe, 'finding')}"
         say(f"{also}, but rotates joints by more than a rounding error")
@@ -421,6 +425,8 @@ class CheckRun:
         if self.fix or self.diff:
             text = self._fix(file, text, lambda: self.finding_filter.make_independent_predicate(text, before))
         found = self.look(text, fold=self.fold, is_reported=self.finding_filter.make_predicate(text, before))
+        if any(finding.severity is Severity.ERROR for finding in found.findings):
+            self.outcome.with_error.add(file)
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 

@@ -79,6 +79,9 @@ def run(command: click.Command, name: str) -> int:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:
             streams.flush_output()
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return error.exit_code
     except click.ClickException as error:
         return _report_usage_error(error)
     except click.Abort:
@@ -99,7 +102,9 @@ def report_error(error: UrdfkinError) -> int:
 def _report_usage_error(error: click.ClickException) -> int:
     context = getattr(error, "ctx", None)
     page = f"; see: {context.command_path} --help" if context is not None else ""
-    say(f"urdfkin: error: {error.format_message().rstrip('.')}{page}", err=True)
+    # Click lists the choices of a missing argument on several lines.
+    message = " ".join(error.format_message().split()).rstrip(".")
+    say(f"urdfkin: error: {message}{page}", err=True)
     return error.exit_code
 
 

@@ -9,6 +9,7 @@ import click
 
 from urdfkin.cli.shell import complete_topic
 from urdfkin.errors import UnknownNameError
+from urdfkin.kinematics.registry import equations, sections
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
@@ -60,14 +61,16 @@ def _indent(code: str) -> str:
 
 
 @click.command("explain")
-@click.argument("topic", metavar="CODE|EQUATION|QUESTION", required=False, shell_complete=complete_topic)
+@click.argument("topic", metavar="CODE|EQUATION|QUESTION|WORD", required=False, shell_complete=complete_topic)
 def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
     CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the
     behaviour of other programs. EQUATION is the number of an equation in the textbook, such as 7.130. Its
     page has the equation, the function that computes it, and the check of this function. QUESTION is the name
-    of a question, or a word of the name. Without an argument, the command lists all codes and questions.
+    of a question, or a word of the name. With another WORD, such as jacobian, the command lists the codes and
+    equations whose description contains the word. Without an argument, the command lists all codes, sections
+    with equations, and questions.
 
     \b
     Example:
@@ -75,11 +78,15 @@ def explain_command(topic: str | None) -> None:
       urdfkin explain rounded-pi
       urdfkin explain 7.130
       urdfkin explain reference-frames
+      urdfkin explain jacobian
     """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     rules = (*RULES.values(), *MJCF_AND_USD_RULES.values())
     if topic is None:
         for rule in rules:
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
+        for section in sections():
+            numbers = [equation.number for equation in section.equations]
+            click.echo(f"equations {numbers[0]} to {numbers[-1]}: {section.title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
@@ -87,9 +94,21 @@ def explain_command(topic: str | None) -> None:
         click.echo(explain(match))
     elif (answer := find_answer(topic)) is not None:
         click.echo(format_answer(answer))
+    elif lines := _list_matches(topic):
+        click.echo("\n".join(lines))
     else:
         names = [name for rule in rules for name in (rule.id, rule.slug)]
         raise UnknownNameError("code, equation or question", topic, [*names, *answers()])
+
+
+def _list_matches(topic: str) -> list[str]:
+    """Return a line for each code and equation whose description contains all words of `topic`."""
+    words = topic.lower().split()
+    if not any(map(str.isalpha, topic)):
+        return []
+    rules = [(rule.id, page(rule.id).title) for rule in (*RULES.values(), *MJCF_AND_USD_RULES.values())]
+    entries = [*rules, *((number, equation.meaning) for number, equation in equations().items())]
+    return [f"{name:7}  {text}" for name, text in entries if all(word in text.lower() for word in words)]
 
 
 def _find_rule(topic: str) -> Rule | None:

@@ -41,6 +41,11 @@ from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 if TYPE_CHECKING:
     from urdfkin.validation.vectors import VectorFiles
 
+_LANGUAGES_OF_SUFFIXES = {
+    ".hpp": "cpp", ".hh": "cpp", ".hxx": "cpp", ".cpp": "cpp", ".cc": "cpp", ".cxx": "cpp",
+    ".cuh": "cuda", ".cu": "cuda", ".py": "numpy", ".m": "matlab", ".tex": "latex",
+}  # fmt: skip
+
 
 @click.command(epilog="Example: urdfkin export panda --frame panda_hand --to c -o panda_hand.c")
 @click.argument("robot", metavar="[ROBOT]", required=False, shell_complete=complete_robot)
@@ -56,7 +61,12 @@ if TYPE_CHECKING:
     show_default=",".join(QUANTITIES),
 )
 @reference_option
-@click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", help="Language of the code.")
+@click.option(
+    "--to",
+    type=click.Choice(tuple(LANGUAGES)),
+    help="Language of the code.",
+    show_default="the language of the suffix of --output (.py: numpy); otherwise c",
+)
 @click.option(
     "--form",
     type=click.Choice(tuple(FORMS)),
@@ -81,7 +91,7 @@ def export_command(
     frame: str | None,
     quantities: tuple[str, ...],
     reference: str,
-    to: str,
+    to: str | None,
     form: str,
     name: str | None,
     file: Path | None,
@@ -110,11 +120,13 @@ def export_command(
     from urdfkin.export.forms import make_robot_code
 
     assert robot is not None
+    if to is None:
+        to = "c" if output is None else _LANGUAGES_OF_SUFFIXES.get(output.suffix.lower(), "c")
     loaded = load_robot(robot, verify=verify)
     names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
     code = code_in(make_robot_code(loaded, frame, names, reference, form, name=name, verify=verify), to)
-    write_output(write(code, to), output)
+    write_output(write(code, to, None if output is None else output.name), output)
     proof = code.proof
     say(format_check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:

@@ -395,6 +395,10 @@ class Inputs:
         return replace(self, settings={**self.settings, **more})
 
 
+#: The family of the findings about masses, shapes and colours. `check` reports them.
+_NOT_KINEMATICS = "URDF7"
+
+
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
     from urdfkin.robot.loading import load
     from urdfkin.urdf.findings import UrdfWarning
@@ -402,7 +406,10 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = load(source, **load_options() | how, verify=verify, oracle=oracle)
+    without_effect = {str(one) for one in robot.findings if one.code.startswith(_NOT_KINEMATICS)}
     for warning in caught:
+        if str(warning.message) in without_effect:
+            continue
         of_the_file = issubclass(warning.category, UrdfWarning)
         say(f"{'' if of_the_file else 'urdfkin: warning: '}{warning.message}", err=True)
     return robot

@@ -25,19 +25,21 @@ _MAX_SUGGESTIONS = 3
 def find_similar_names(
     word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_COMPARISONS
 ) -> list[str]:
-    """Return up to three known names that look like `word`, the most similar first.
+    """Return up to three known names that look like `word` in any case, the most similar first.
 
     `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
     `work` compared pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
+    >>> nearest("UR5", ["ur5", "panda"])
+    ['ur5']
     """
-    prefix = word[:_MAX_COMPARED_CHARACTERS]
+    prefix = word[:_MAX_COMPARED_CHARACTERS].lower()
     matcher = difflib.SequenceMatcher(b=prefix)
     found = []
     for name in valid_names:
-        matcher.set_seq1(name[:_MAX_COMPARED_CHARACTERS])
+        matcher.set_seq1(name[:_MAX_COMPARED_CHARACTERS].lower())
         if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
             continue
         work -= len(prefix) * len(name[:_MAX_COMPARED_CHARACTERS])

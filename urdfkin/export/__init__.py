@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from typing import TYPE_CHECKING, cast
 
 from urdfkin.errors import UnknownNameError
@@ -36,10 +37,17 @@ def code_in(code: FrameCode, to: str) -> FrameCode:
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
-def write(code: FrameCode, to: str) -> str:
-    """Return the text of an exported file with its digest."""
+def write(code: FrameCode, to: str, file: str | None = None) -> str:
+    """Return the text of an exported file with its digest.
+
+    `file` is the name under which the file will be stored; the commands in its comments use this name.
+    """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     from urdfkin.export.check import seal
 
-    return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))
+    module, suffix = LANGUAGES[to]
+    text = cast("str", importlib.import_module(module).write(code_in(code, to), to))
+    if file is not None and re.fullmatch(r"\w[\w.-]*", file, re.ASCII):
+        text = re.sub(rf"(?<=[ \"]){re.escape(code.name + suffix)}(?=[ )\"\n])", file, text)
+    return seal(text)

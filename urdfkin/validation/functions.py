@@ -201,12 +201,19 @@ class FunctionCheck(Displayable):
                 " difference."
             )
         if self.errors:
-            parts.append(f"{self.errors} configurations without a result of the right shape:")
-            parts += [f"  sample {error.sample}: {error.message}" for error in self.first_errors]
-        if not self.agrees and self.compared:
+            parts.append(f"{self.errors} configurations without a usable result; the first ones:")
+            parts += self._list_first_errors()
+        if not self.agrees:
             parts += [f"Diagnosis: {words}." for words in self.diagnoses]
+        if not self.agrees and self.compared:
             parts += self._describe_worst()
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
+
+    def _list_first_errors(self) -> Iterator[str]:
+        """Yield a line for each message in `first_errors`, with the samples that have this message."""
+        for message in dict.fromkeys(error.message for error in self.first_errors):
+            samples = [str(error.sample) for error in self.first_errors if error.message == message]
+            yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
 
     def _describe_worst(self) -> Iterator[str | Table]:
         for title, ratios in (("row", self.rows), ("column", self.columns)):
@@ -665,7 +672,11 @@ def _call(
 ) -> FloatArray | None:
     """Call the function and return a copy of its result, or add its error to `total` and return None."""
     try:
-        given = np.asanyarray(function(*inputs))
+        result = function(*inputs)
+        if result is None:
+            total.error(sample, "the function returns None; is `return` missing?", configurations)
+            return None
+        given = np.asanyarray(result)
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
             kind = "a masked array" if np.ma.isMaskedArray(given) else f"an array of {given.dtype}"
             total.error(sample, f"{kind}, expected real numbers", configurations)

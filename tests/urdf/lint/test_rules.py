@@ -191,3 +191,9 @@ def test_findings_beyond_the_number_of_stored_ones_are_also_silenced() -> None:
     )
     assert len(check(text)) == MAX_COMPLETE_FINDINGS
     assert check(COMMENT.format("URDF207") + text) == []
+
+
+def test_a_misspelt_mimicked_joint_is_not_suggested_to_be_the_mimic_joint_itself() -> None:
+    text = arm(follow='<mimic joint="jj2"/>')
+    remedies = [str(finding.remedy) for finding in check(text) if finding.code == "URDF520"]
+    assert [remedy.partition(" (")[0] for remedy in remedies] == ["name a joint of the robot"]

@@ -86,8 +86,9 @@ def find_better_interpretation(
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
+        # A variable such as q1 in an exchanged column makes a revolute joint prismatic.
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
-            return None
+            continue
         difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())
         candidates.append((difference, interpretation.difference_count(stated), interpretation, table))
     if not candidates:

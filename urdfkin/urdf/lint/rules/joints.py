@@ -373,7 +373,7 @@ class _MimicChecker:
             return
         mimicked_joint = self.joints.get(mimic.mimicked_joint)
         if mimicked_joint is None:
-            self.report_unknown(mimic)
+            self.report_unknown(joint, mimic)
         elif joint.name in self.in_loops:
             itself = mimicked_joint is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
@@ -385,8 +385,9 @@ class _MimicChecker:
         else:
             self.check_rule(joint, mimic, mimicked_joint)
 
-    def report_unknown(self, mimic: MimicRecord) -> None:
-        nearest = self.report.nearest(mimic.mimicked_joint, self.joints)
+    def report_unknown(self, joint: JointRecord, mimic: MimicRecord) -> None:
+        others = (name for name in self.joints if name != joint.name)
+        nearest = self.report.nearest(mimic.mimicked_joint, others)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
