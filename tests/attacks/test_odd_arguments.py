@@ -200,3 +200,8 @@ def test_arrays_that_are_not_real_numbers_are_refused(given: str, verify: bool, 
 )
 def test_real_numbers_of_every_type_are_accepted(given: Any, robot: Robot) -> None:
     np.testing.assert_array_equal(robot.placement(given, "c"), robot.placement([1.0, 2.0], "c"))
+
+
+def test_a_message_shows_that_a_long_value_is_cut() -> None:
+    with pytest.raises(urdfkin.errors.InputError, match=r"found array\(.{51}\.\.\.$"):
+        urdfkin.load(ARM, verify=False).placement(np.array(["0.123456789"] * 20), "j")

@@ -147,6 +147,14 @@ def test_a_file_that_is_not_json_is_refused(layout: DocumentKind[Any], text: str
         layout.read(path)
 
 
+@of_every_layout
+def test_a_page_instead_of_json_is_named(layout: DocumentKind[Any], tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text("\n<!doctype html>")
+    with pytest.raises(InputError, match="not a JSON file: found an HTML or XML file"):
+        layout.read(path)
+
+
 def test_serialized_data_has_no_infinity_and_preserves_names_that_are_not_valid_text() -> None:
     assert as_json_data({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {
         "a": [None, None, -0.0, "\udc80"]

@@ -8,12 +8,12 @@ import textwrap
 import click
 
 from urdfkin.cli.shell import complete_topic
-from urdfkin.errors import UnknownNameError
-from urdfkin.kinematics.registry import equations, sections
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.registry import LAST_EQUATION, equations, sections
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
 from urdfkin.system.resources import questions_page
-from urdfkin.urdf.findings import Rule
+from urdfkin.urdf.findings import Rule, shorten
 from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, PROSE_WIDTH, RULES, explain, find_rule, page
 
 _LINK = re.compile(r"\[([^\]]+)\]\([^)\s]+\)")
@@ -96,6 +96,12 @@ def explain_command(topic: str | None) -> None:
         click.echo(format_answer(answer))
     elif lines := _list_matches(topic):
         click.echo("\n".join(lines))
+    elif re.fullmatch(r"[\d.]+", topic):
+        raise InputError(
+            "the textbook's chapter has no such equation",
+            found=shorten(topic),
+            remedy=f"give a number from 7.1 to 7.{LAST_EQUATION}",
+        )
     else:
         names = [name for rule in rules for name in (rule.id, rule.slug)]
         raise UnknownNameError("code, equation or question", topic, [*names, *answers()])

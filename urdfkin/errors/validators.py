@@ -80,7 +80,8 @@ def as_bool(value: object, name: str) -> bool:
 
 def safe_repr(value: object) -> str:
     try:
-        return repr(value)[:60]
+        text = repr(value)
+        return text if len(text) <= 60 else f"{text[:57]}..."
     except Exception:
         # For example, the repr of an int with 5,000 digits raises ValueError.
         return f"an object of type {type(value).__name__}"

@@ -187,7 +187,9 @@ def parse_json(content: bytes, where: str) -> object:
     try:
         return json.loads(content, parse_constant=_parse_finite, parse_float=_parse_finite)
     except (ValueError, RecursionError) as error:
-        raise InputError("not a JSON file", where=where, found=str(error)) from error
+        page = content.lstrip()[:1] == b"<"
+        found = "an HTML or XML file" if page else str(error)
+        raise InputError("not a JSON file", where=where, found=found) from error
 
 
 def _parse_finite(word: str) -> float:
