@@ -18,7 +18,7 @@ from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.verify.bounds import magnitudes
-from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
+from urdfkin.verify.oracle import free_flyer, free_flyer_velocity, nearest_quaternion
 
 ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', "0.6 0 0.8"))
 
@@ -81,7 +81,7 @@ def test_a_base_keeps_its_numbers_and_a_floating_joint_has_velocities_in_its_own
     generator = np.random.default_rng(4)
     R, six = orientations(50, 3), generator.normal(size=(50, 6))
     expected = np.einsum("nji,npj->npi", nearest_rotation(R), six.reshape(50, 2, 3)).reshape(50, 6)
-    np.testing.assert_allclose(free_flyer_rates(BaseMotion(at(R), six)), expected, atol=1e-14)
+    np.testing.assert_allclose(free_flyer_velocity(BaseMotion(at(R), six)), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("frame", ["a", "b"])

@@ -68,10 +68,10 @@ Write = Callable[..., Path]
 def patch(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Read MJCF in this process, so that a test can replace functions."""
 
-    def ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
+    def ask(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
         return json.loads(json.dumps(list(mjcf_process.answers(request)))), "ended"
 
-    monkeypatch.setattr(mjcf_check, "_ask", ask)
+    monkeypatch.setattr(mjcf_check, "_ask_process", ask)
     return monkeypatch
 
 
@@ -454,7 +454,7 @@ def test_the_compilation_of_a_file_with_endless_replicas_ends_with_an_error() ->
         inside = f'<replicate count="1000" offset="1 0 0">{inside}</replicate>'
     began = time.monotonic()
     with pytest.raises(InputError, match="cannot compile this MJCF: found MuJoCo did not finish within 3 s"):
-        mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
+        mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", timeout=3.0)
     assert time.monotonic() - began < 20.0
 
 

@@ -708,7 +708,7 @@ def test_two_to_the_power_of_40_prims_are_an_error_in_limited_time(write: Write)
     path = write(stage(ARM) + prims)
     begin = time.monotonic()
     with pytest.raises(InputError, match=r"cannot read this stage.*(does not|did not finish|memory)"):
-        usd_check.read_usd(path, patience=4.0)
+        usd_check.read_usd(path, timeout=4.0)
     assert time.monotonic() - begin < 30.0
 
 
@@ -837,7 +837,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     from urdfkin.verify import usd_process
 
     def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
-        return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0
+        return json.dumps(usd_process.read_stage(json.loads(request))).encode() + b"\n", 0
 
     monkeypatch.setattr(usd_check, "ask_python", ask)
     return loaded(path)
@@ -1483,6 +1483,6 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
             kind = op.rstrip("XYZ")
             worst[kind] = max(worst[kind], angle / SINGLE)
     # The error of an angle above 256 degrees is at most 2^-16 degrees; the errors of several angles add.
-    assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
+    assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM_ROUNDINGS
     assert 1.0 < worst["Orient"] <= 4.0
     assert 0.5 < worst["Transform"] <= math.sqrt(1.5)

@@ -296,7 +296,7 @@ PLANTED: dict[str, tuple[str, Callable[[Any], Any], str]] = {
 
 def plant(monkeypatch: pytest.MonkeyPatch, what: str) -> str:
     """Let yourdfpy read a joint wrongly; return the difference to report."""
-    right, (attribute, change, words) = second_reader.read, PLANTED[what]
+    right, (attribute, change, words) = second_reader.read_with_yourdfpy, PLANTED[what]
 
     def wrong(text: str) -> Any:
         robot = right(text)
@@ -305,7 +305,7 @@ def plant(monkeypatch: pytest.MonkeyPatch, what: str) -> str:
         setattr(owner, name, change(getattr(owner, name)))
         return robot
 
-    monkeypatch.setattr(second_reader, "read", wrong)
+    monkeypatch.setattr(second_reader, "read_with_yourdfpy", wrong)
     return words
 
 
@@ -339,7 +339,7 @@ def test_known_faults_of_the_second_reader_are_listed_and_are_no_differences() -
 def test_a_file_that_yourdfpy_cannot_read_is_reported_and_is_no_failure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(second_reader, "read", Mock(side_effect=KeyError("link")))
+    monkeypatch.setattr(second_reader, "read_with_yourdfpy", Mock(side_effect=KeyError("link")))
     report = validate(ARM, samples=0)
     assert report.passed
     assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"  # type: ignore[index]

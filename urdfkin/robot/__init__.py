@@ -76,7 +76,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
-    from urdfkin.verify.usd_check import SinglePrecision
+    from urdfkin.verify.usd_check import SinglePrecisionErrors
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
@@ -167,7 +167,7 @@ class Robot(Displayable):
         )
         self.findings = Findings(findings)
         #: Bounds on the errors of poses that a USD stage stores in single precision; None for other sources.
-        self.single: SinglePrecision | None = None
+        self.single: SinglePrecisionErrors | None = None
         #: USD path of each link's prim (scene object), for a robot from a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)

@@ -237,7 +237,7 @@ def _load_usd(
     import hashlib
 
     from urdfkin.urdf.lint.rules.left_out import of_usd
-    from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision
+    from urdfkin.verify.usd_check import check_usd_source, read_usd, bound_single_precision_errors
 
     _refuse_arguments(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
@@ -260,7 +260,7 @@ def _load_usd(
     line, remarks = check_usd_source(verifier, read)
     listed = of_usd((*read.remarks, *remarks), name, data)
     robot = robot_of(text, **how, listed=listed, made=True)
-    robot.single = single_precision(robot.tree, read.answer["single"])
+    robot.single = bound_single_precision_errors(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]
     if wanted:
         robot.verifier.reading = line

@@ -41,7 +41,7 @@ from urdfkin.verify.bounds import (
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle import BaseRows, davenport
+from urdfkin.verify.oracle import BaseRows, davenport_matrix
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
@@ -203,7 +203,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
     Both q and -q represent a rotation; the result is the quaternion closer to `near`.
     """
-    K = davenport(R)
+    K = davenport_matrix(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit

@@ -386,7 +386,7 @@ class _Run:
         worst = total.worst
         if worst is not None:
             values = self._ours(worst.inputs)
-            worst = replace(worst, replay=self._replay(values))
+            worst = replace(worst, replay=self._make_replay_line(values))
         return FunctionCheck(
             getattr(self.function, "__name__", type(self.function).__name__),
             robot.name,
@@ -571,7 +571,7 @@ class _Run:
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
         one = copy(self.recorder.calls[self.row.name])
         one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
-        return self.robot.verifier._replay(self.row, one, 0, self.frame)
+        return self.robot.verifier._make_replay_line(self.row, one, 0, self.frame)
 
     def _row_names(self) -> tuple[str, ...]:
         row = self.row

@@ -65,9 +65,9 @@ from urdfkin.model.tree import FloatArray
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
-_OF_BASE = 9, 12, 15, 18, 21
+_BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
 #: Number of configurations that the kernel `lengths` processes at once; their data fit into the L1 cache.
-_BLOCK = 64
+_BLOCK_LENGTH = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def magnitudes(
     `q` has the shape (n, nq); `v` and `a` have the shape (n, nv) or are None. `base` (1 or n, 24) is the
     state of the moving base. Without v, only `p` and `roundings` are valid.
     """
-    n, lengths = len(q), _lengths(plan)
+    n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
@@ -110,29 +110,29 @@ def magnitudes(
     kernel = preload.kernel("lengths", home=KERNELS) if n > 1 and len(inputs) > 2 else None
     if kernel is None:
         begin = time.thread_time()
-        _by_steps(lengths, inputs, out)
+        _fill_without_kernel(lengths, inputs, out)
         if n > 1:
             preload.spend("lengths", time.thread_time() - begin)
     else:
-        _by_kernel(kernel, lengths, inputs, out)
+        _fill_with_kernel(kernel, lengths, inputs, out)
     is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
     out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
-def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
-    states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
+    states = [tuple(_norm(base[at : at + 3]) for at in _BASE_VECTOR_INDICES)]
     for link in lengths.links:
-        states.append((_step if rates else _place)(link, states[link.parent + 1], q, *rates))
+        states.append((_propagate_state if rates else _propagate_position)(link, states[link.parent + 1], q, *rates))
     for end in lengths.ends:
-        carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
+        carried = (steps.carried if rates else _translate_position)(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
             row[:, end.frame] = values
 
 
-def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Fill `out` with the compiled kernel; the results equal those of `_by_steps` bit for bit."""
+def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Fill `out` with the compiled kernel; the results equal those of `_fill_without_kernel` bit for bit."""
     links = lengths.links
     # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -145,14 +145,14 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
     kernel(
         *lengths.tables,
         *map(np.ascontiguousarray, (q, v, a)),
-        _rows(free),
-        norm(base[:, _OF_BASE[0] :].reshape(-1, len(_OF_BASE), 3)),
-        np.zeros((len(links) + 2, len(_OF_BASE), _BLOCK)),
+        _stack_columns(free),
+        norm(base[:, _BASE_VECTOR_INDICES[0] :].reshape(-1, len(_BASE_VECTOR_INDICES), 3)),
+        np.zeros((len(links) + 2, len(_BASE_VECTOR_INDICES), _BLOCK_LENGTH)),
         out[:5].reshape(-1),
     )
 
 
-def _rows(columns: Sequence[FloatArray]) -> FloatArray:
+def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
     """Return an array with the given columns; a column of length 1 fills all rows."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
@@ -172,7 +172,7 @@ class _MovingJoint(NamedTuple):
     offset: float
 
 
-class _End(NamedTuple):
+class _FrameEnd(NamedTuple):
     """A frame, the last moving joint `step` before the frame, and the path length (m) from joint to frame."""
 
     step: int
@@ -184,11 +184,11 @@ class _Lengths(NamedTuple):
     """Moving joints and frames of a compiled tree, as Python numbers and as arrays."""
 
     links: list[_MovingJoint]
-    ends: list[_End]
+    ends: list[_FrameEnd]
     tables: tuple[NDArray[Any], ...]
 
 
-def _lengths(plan: CompiledTree) -> _Lengths:
+def _get_lengths(plan: CompiledTree) -> _Lengths:
     found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -199,7 +199,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
             for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
-        ends = [_End(step, frame, length) for (step, frame), length in frames]
+        ends = [_FrameEnd(step, frame, length) for (step, frame), length in frames]
         tables = (
             np.array([link[:4] for link in links], dtype=np.int64).reshape(-1, 4),
             np.array([link[4:] for link in links]).reshape(-1, 3),
@@ -219,36 +219,36 @@ def _norm(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
-def _carried_place(state: State, d: Length) -> State:
+def _translate_position(state: State, d: Length) -> State:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
 #: Number of translations and number of rotations, for a planar and for a floating joint.
-_FREE_PARTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
+_FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
 def _displacement(link: _MovingJoint, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
     if link.kind != JointMotion.SLIDE:
-        return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
+        return _norm(q[link.q : link.q + _FREE_JOINT_SIZES[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
-def _place(link: _MovingJoint, state: State, q: Any) -> State:
+def _propagate_position(link: _MovingJoint, state: State, q: Any) -> State:
     turns = link.kind == JointMotion.TURN
-    return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
+    return _translate_position(state, link.length if turns else link.length + _displacement(link, q))
 
 
 def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
     """Return the norms of a planar or floating joint's displacement, velocities and accelerations."""
-    at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
+    at, (slides, turns) = link.v, _FREE_JOINT_SIZES[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
     )
     return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
+def _propagate_state(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
     kind, d, at = link.kind, link.length, link.v
     if kind >= JointMotion.PLANAR:
         slid, *rates = _free_lengths(link, q, v, a)
@@ -262,7 +262,7 @@ def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 #: A scale above the range of doubles becomes inf, and no result is then accepted.
-_BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
+_allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +301,7 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
 
 
-@_BEYOND
+@_allow_overflow
 def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of urdfkin with MuJoCo.
 
@@ -397,7 +397,7 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     return scale
 
 
-@_BEYOND
+@_allow_overflow
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
@@ -424,16 +424,16 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     return Bound(scale, bound.k)
 
 
-@_BEYOND
+@_allow_overflow
 def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on velocities [linear; angular], (n, frames, 6)."""
     linear = size.vel
     if reference.at_world:
         linear = eq.point_velocity(linear, size.w, size.p)
-    return _in_six_rows(linear, size.w)
+    return _repeat_as_six_rows(linear, size.w)
 
 
-@_BEYOND
+@_allow_overflow
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
@@ -457,16 +457,16 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     linear = size.acc + shared
     if reference.at_world:
         linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
-    return _in_six_rows(linear, size.alpha)
+    return _repeat_as_six_rows(linear, size.alpha)
 
 
-@_BEYOND
+@_allow_overflow
 def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
     """Return the scale of the bound on IMU readings, (n, frames, 6), for a gravity vector (3,)."""
-    return _in_six_rows(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
+    return _repeat_as_six_rows(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
-def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
+def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
     """Return (n, frames, 6, ...) with three rows of `linear` and three rows of `angular`."""
     scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
     rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # `np.moveaxis` is slower.
@@ -474,7 +474,7 @@ def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
     return scale
 
 
-@_BEYOND
+@_allow_overflow
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
@@ -485,10 +485,10 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
-    return _in_six_rows(linear + sliding, angular)
+    return _repeat_as_six_rows(linear + sliding, angular)
 
 
-@_BEYOND
+@_allow_overflow
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
@@ -504,7 +504,7 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
         column, axis = eq.turning_column(turning, p)
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
-    return _in_six_rows(linear, angular)
+    return _repeat_as_six_rows(linear, angular)
 
 
 #: In the linear rows, Pinocchio's derivative of Jacobian column i by joint j is a sum of cross products.
@@ -519,7 +519,7 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 }
 
 
-@_BEYOND
+@_allow_overflow
 def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
@@ -555,10 +555,10 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
         np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
         np.add.at(angular, pair, both * (before != reference.own_axes))
     linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
-    return _in_six_rows(linear, angular)
+    return _repeat_as_six_rows(linear, angular)
 
 
-@_BEYOND
+@_allow_overflow
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 

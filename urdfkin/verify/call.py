@@ -23,7 +23,7 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 T = TypeVar("T")
 
 #: Array types that do not override methods of NumPy's arrays.
-_PLAIN = np.ndarray, np.memmap
+_PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
@@ -70,7 +70,7 @@ class Call:
             for x, by, name in zip(given, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
-        self.several, self.frames = _frames(frame)
+        self.several, self.frames = _parse_frames(frame)
         joints = [(joint.name, joint.nv) for joint in tree.joints if joint.nv] if any(named) else ()
         self.question = OracleQuery(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
@@ -118,13 +118,13 @@ class Call:
         if out is None:
             return None
         wanted = (*self.shape, *((len(self.links),) if self.several else ()), *shape)
-        good = type(out) in _PLAIN and out.dtype == np.float64 and out.flags.carray
+        good = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
         if not good or out.shape != wanted:
             raise InputError(
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
-                found=_described(out),
+                found=_describe_array(out),
                 remedy="np.asarray(out) is a plain array"
-                if isinstance(out, np.ndarray) and type(out) not in _PLAIN
+                if isinstance(out, np.ndarray) and type(out) not in _PLAIN_ARRAY_TYPES
                 else None,
             )
         self.question.read()
@@ -158,7 +158,7 @@ class Call:
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
-def _described(out: object) -> str:
+def _describe_array(out: object) -> str:
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -170,7 +170,7 @@ def _described(out: object) -> str:
     return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 
-def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
+def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     """Return whether `frame` is a list, and the names."""
     if isinstance(frame, str):
         return False, (frame,)

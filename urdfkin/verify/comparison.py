@@ -96,8 +96,8 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     n, numbers = math.prod(leading), math.prod(own)
     shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
     shape = (1, *ours.shape[1:]) if shared else ours.shape
-    one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
-    size = _rows(scale, shape, math.prod(shape[:axes]), numbers)
+    one, other = _as_rows(ours, ours.shape, n, numbers), _as_rows(theirs, ours.shape, n, numbers)
+    size = _as_rows(scale, shape, math.prod(shape[:axes]), numbers)
     if (kernel := preload.kernel("worst", home=KERNELS)) is None:
         begin = time.thread_time()
         scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
@@ -114,7 +114,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     return worst.reshape(leading)
 
 
-def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
+def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
     if x.shape != shape:  # `broadcast_to` is slow.
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)

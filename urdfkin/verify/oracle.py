@@ -59,10 +59,10 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         for joint in plain_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
-    return resolved_rules(rules)
+    return resolve_rules(rules)
 
 
-def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
+def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules, so that each rule refers to an independent joint.
 
     A chain of rules gives q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
@@ -83,10 +83,10 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     return {joint: known[joint] for joint in rules}
 
 
-def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
+def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
     """Return the values of the locked joints and of all joints that mimic a locked joint.
 
-    >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
+    >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
     """
     moved = {
@@ -98,9 +98,9 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
-#: `_COORDINATES` maps each size to the joint's number of coordinates in urdfkin.
+#: `_COORDINATE_COUNTS` maps each size to the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-_COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
+_COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
@@ -131,7 +131,7 @@ class PinocchioLayout:
         for name, size in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
-                self.nq, self.nv = self.nq + _COORDINATES[size], self.nv + size[1]
+                self.nq, self.nv = self.nq + _COORDINATE_COUNTS[size], self.nv + size[1]
         self._joints = list[_JointIndices]()
         for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
@@ -150,7 +150,7 @@ class PinocchioLayout:
                 self._factor[joint.full_v + c] = joint.multiplier
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
-        self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
+        self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
         #: `_same_q` and `_same_v` are True if q and v are valid inputs of Pinocchio without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
@@ -159,7 +159,7 @@ class PinocchioLayout:
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    def _select_by_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -232,9 +232,9 @@ class Frames:
     def index(self, name: str) -> int:
         """Return the index of a frame; raise OracleError for an unknown or ambiguous name."""
         if isinstance(name, LinkFrame):
-            return self._index_in(self._bodies, name, str(name)[5:])
+            return self._find_index(self._bodies, name, str(name)[5:])
         if isinstance(name, JointFrame):
-            return self._index_in(self._joints, name, str(name)[6:])
+            return self._find_index(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
         if body is not None and joint is not None and self._parents.get(body, body) != joint:
             raise self._error(f"two of {self._oracle}'s frames have this name", name)
@@ -244,9 +244,9 @@ class Frames:
             return joint
         if (parts := _PREFIXED.fullmatch(name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
-        return self._index_in(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
+        return self._find_index(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
-    def _index_in(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
+    def _find_index(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
         if (index := frames.get(plain_name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
         return index
@@ -255,16 +255,16 @@ class Frames:
         return OracleError(what, where=self._robot, found=repr(str(name)))
 
 
-def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
+def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
     """Return the frames of a Pinocchio model.
 
-    If `stands_on_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
+    If `includes_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
     """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
             (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
-    if stands_on_world:
+    if includes_world:
         bodies[WORLD] = 0
     parents = {index: int(frame.parentFrame) for index, frame in enumerate(model.frames)}
     return Frames("Pinocchio", str(model.name), bodies, joints, parents)
@@ -292,21 +292,21 @@ def free_flyer(base: BaseNumbers) -> FloatArray:
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
-def free_flyer_rates(base: BaseNumbers) -> FloatArray:
+def free_flyer_velocity(base: BaseNumbers) -> FloatArray:
     """Return the base's velocity in the axes of the base, (..., 6)."""
-    return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
+    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
-def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
+def free_flyer_acceleration(base: BaseNumbers) -> FloatArray:
     """Return the base's spatial acceleration, acc - w x vel, in the axes of the base, (..., 6)."""
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
-    return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
+    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
-    K = davenport(M)
+    K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Rounding gives the computed q small components along the other eigenvectors of K.
     # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
@@ -315,7 +315,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     return unit
 
 
-def davenport(M: NDArray[Any]) -> NDArray[Any]:
+def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
     """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); K = 4 q q^T - I for a rotation M."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
@@ -327,7 +327,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
     return K
 
 
-def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
+def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Rotate the linear part and the angular part y of each six-vector by R^T.
 
     Let u be the vector part and w the scalar part of the quaternion. With c = y x u,
@@ -340,18 +340,18 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     return rotated.reshape(*rotated.shape[:-2], 6)
 
 
-_NAMED = 5
+_MAX_NAMES = 5
 
 #: Names of the coordinates of a planar joint (3 joint velocities) and of a floating joint (6).
-_OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
+_Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 #: Names of the joint velocities of a planar joint (3) or a floating joint (6).
-_OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
+_VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
 class _CoordinateNames:
     """Map names of joints and coordinates to indices in q or v.
 
-    >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _OF_Q)
+    >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _Q_SUFFIXES)
     >>> names.place("base.y"), names.place("base"), names.place("elbow")
     (1, slice(0, 3, None), 3)
     >>> names.pairs("ready, base.x = 5mm, elbow=pi / 2")
@@ -388,7 +388,7 @@ class _CoordinateNames:
         return [(m[1], plain[m.end() : end].strip(" ,")) for m, end in zip(starts, ends, strict=False)]
 
 
-def _number(text: str) -> float:
+def _parse_number(text: str) -> float:
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
@@ -467,16 +467,16 @@ class OracleQuery:
         return tuple(
             np.asarray(x, dtype=np.float64)
             if named is None
-            else self._with_named(np.array(x, float), named, of)
-            for x, named, of in zip(self._arrays, self._named, (_OF_Q, _OF_RATES, _OF_RATES), strict=False)
+            else self._set_named_values(np.array(x, float), named, of)
+            for x, named, of in zip(self._arrays, self._named, (_Q_SUFFIXES, _VELOCITY_SUFFIXES, _VELOCITY_SUFFIXES), strict=False)
         )
 
-    def _with_named(
+    def _set_named_values(
         self, x: FloatArray, named: str | Mapping[str, ArrayLike], suffixes: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
         names = _CoordinateNames(self._joints, suffixes)
         for name, value in named.items() if isinstance(named, Mapping) else names.pairs(named):
-            x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
+            x[..., names.place(name)] = _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
         return x
 
     @cached_property
@@ -574,7 +574,7 @@ class Oracle:
         ):
             if theirs != own:
                 found = (
-                    ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED])
+                    ", ".join(sorted(set(theirs) ^ set(own))[:_MAX_NAMES])
                     or "the same names in a different order"
                 )
                 raise OracleError(
@@ -631,7 +631,7 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
         begin = time.thread_time()
-        sums = _coupled(rows, columns, index, factor, nv)
+        sums = _couple_rows(rows, columns, index, factor, nv)
         preload.spend("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
@@ -640,7 +640,7 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
 
 
 @np.errstate(all="ignore")
-def _coupled(rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
+def _couple_rows(rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     sums = np.zeros((len(rows), nv))
     for column in columns:
         sums[:, index[column]] += rows[:, column] * factor[column]

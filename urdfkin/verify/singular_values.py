@@ -33,9 +33,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
 #: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
-_OUTWARD = 256.0 * EPS
+_RELATIVE_ERROR = 256.0 * EPS
 #: Maximum number of samples of a batch in the printed table.
-_SHOWN = 10
+_MAX_ROWS = 10
 
 
 class Between(NamedTuple):
@@ -97,9 +97,9 @@ class SingularValues(Displayable):
                 )
             ]
             heads = ["sample", *names, "condition", "manipulability", "rank"]
-            rest = len(rows) - _SHOWN
+            rest = len(rows) - _MAX_ROWS
             more = [f"... and {rest} more samples"] if rest > 0 else []
-            return TextDocument(title, [Table(heads, rows[:_SHOWN]), *more])
+            return TextDocument(title, [Table(heads, rows[:_MAX_ROWS]), *more])
         lines = [[name, *(f"{side[i]:.15g}" for side in self.values)] for i, name in enumerate(names)]
         for name, between in (("condition", self.condition), ("manipulability", self.manipulability)):
             lines.append([name, *(f"{side:.15g}" for side in between)])
@@ -146,7 +146,7 @@ class SingularValues(Displayable):
             nothing = np.zeros(self.values.value.shape[:-1])
             return Between(nothing, nothing, nothing)
         value, lower, upper = map(_product, self.values)
-        return Between(value, np.maximum(_down(lower), 0.0), _up(upper))
+        return Between(value, np.maximum(_round_down(lower), 0.0), _round_up(upper))
 
     @cached_property
     def condition(self) -> Between:
@@ -174,7 +174,7 @@ class SingularValues(Displayable):
                     (upper[..., 0], lower[..., -1]),
                 )
             )
-        return Between(middle, np.maximum(_down(least), 1.0), _up(most))
+        return Between(middle, np.maximum(_round_down(least), 1.0), _round_up(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
@@ -232,15 +232,15 @@ def singular_values(
         left = np.abs(A - (U * s[..., np.newaxis, :]) @ Vt)
         sizes = np.abs(A) + (np.abs(U) * s[..., np.newaxis, :]) @ np.abs(Vt)
         residual = _norm(left + terms * (EPS * sizes + SMALLEST) + off)
-        skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
-        lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
-        upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
+        skew = _orthogonality_error(U) + _orthogonality_error(Vt.swapaxes(-1, -2))
+        lower = s * _round_down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
+        upper = s * _round_up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
     # A lower bound of NaN becomes 0, and an upper bound of NaN becomes inf.
-    lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
+    lower, upper = np.nan_to_num(_round_down(lower), nan=0.0), np.nan_to_num(_round_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
 
-def _skew(U: FloatArray) -> FloatArray:
+def _orthogonality_error(U: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm |U^T U - I| for U (..., m, k)."""
     back = U.swapaxes(-1, -2)
     rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
@@ -254,7 +254,7 @@ def _norm(E: FloatArray) -> FloatArray:
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
-    return _up(norm)
+    return _round_up(norm)
 
 
 def _product(x: FloatArray) -> FloatArray:
@@ -265,14 +265,14 @@ def _product(x: FloatArray) -> FloatArray:
     return product
 
 
-def _up(x: FloatArray) -> FloatArray:
+def _round_up(x: FloatArray) -> FloatArray:
     """Return an upper bound on the exact number whose rounded value is `x`."""
     with np.errstate(over="ignore", under="ignore"):
-        return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
+        return np.nextafter(x + np.abs(x) * _RELATIVE_ERROR, np.inf)
 
 
-def _down(x: FloatArray) -> FloatArray:
+def _round_down(x: FloatArray) -> FloatArray:
     """Return a lower bound on the exact number whose rounded value is `x`; for inf, the largest double."""
     with np.errstate(under="ignore", invalid="ignore"):
-        inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
+        inside = np.nextafter(x - np.abs(x) * _RELATIVE_ERROR, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

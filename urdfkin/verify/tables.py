@@ -17,7 +17,7 @@ that are close to a multiple of 15 degrees. If snapping has changed a table, the
 effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
 the length of the path from the root to the table's base plus the length of the path from the root to the tip.
 Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum instead of the reach, but at most `PROMISED` times the reach. In a table with
+reach, the bound uses this sum instead of the reach, but at most `MAX_LENGTH_RATIO` times the reach. In a table with
 Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic rules. The
 bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
@@ -47,7 +47,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
-PROMISED = 10.0
+MAX_LENGTH_RATIO = 10.0
 
 
 class TableError(UrdfkinError):
@@ -121,28 +121,28 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
             np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
             rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
         ),
-        "jacobian": _halves(jacobian(table, own_q) - motion.jacobian[..., columns]),
-        "acceleration": _halves(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
+        "jacobian": _split_rows(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        "acceleration": _split_rows(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
     }
     size = sizes(tree, table, samples)
-    slack = _Slack(table, own_q, size)
-    units, shares = _measured(differences, size, slack)
+    snap_effect = _SnapEffect(table, own_q, size)
+    units, shares = _compare_with_bounds(differences, size, snap_effect)
     loss = None
-    own = own_length(table)
+    own = table_length(table)
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
-        _, longer = _measured(differences, size.of_length(own), slack)
-        loss = _loss(table) if max(longer.values()) <= 1.0 else None
+        _, longer = _compare_with_bounds(differences, size.with_reach(own), snap_effect)
+        loss = _describe_loss(table) if max(longer.values()) <= 1.0 else None
     metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
     snapped = bool(table.snap and table.snap.changes)
     return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
 
 
-def own_length(table: DHTable) -> float:
+def table_length(table: DHTable) -> float:
     """Return the sum of all lengths in a table, with base and tool, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
-def _loss(table: DHTable) -> str:
+def _describe_loss(table: DHTable) -> str:
     """Return a text that names the longest length in the table, its rounding error and a remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
@@ -160,8 +160,8 @@ def _loss(table: DHTable) -> str:
 _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
-def _measured(
-    differences: _Differences, size: Sizes, slack: _Slack
+def _compare_with_bounds(
+    differences: _Differences, size: Sizes, snap_effect: _SnapEffect
 ) -> tuple[dict[str, float], dict[str, float]]:
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(size.reach)
@@ -170,25 +170,25 @@ def _measured(
     #: One pair for the linear and one for the angular differences. The first value is multiplied by the
     #: relative rounding error; the second value is the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
-        "placement": ((size.reach, slack.metres), (one, slack.turn)),
+        "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
-            (size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
-            (size.turning * one[:, None], slack.turn * columns),
+            (size.turning * reach + size.sliding, snap_effect.jacobian[:, None] * columns),
+            (size.turning * one[:, None], snap_effect.turn * columns),
         ),
         "acceleration": (
-            ((size.reach + slides) * rates, slack.acceleration * rates),
-            (rates, 4.0 * slack.turn * rates),
+            ((size.reach + slides) * rates, snap_effect.acceleration * rates),
+            (rates, 4.0 * snap_effect.turn * rates),
         ),
     }
     units, shares = dict[str, float](), dict[str, float]()
     for name, halves in differences.items():
         pairs = list(zip(halves, limits[name], strict=True))
-        units[name] = max(_worst(x, scale * EPS) for x, (scale, _) in pairs)
-        shares[name] = max(_worst(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
+        units[name] = max(_max_ratio(x, scale * EPS) for x, (scale, _) in pairs)
+        shares[name] = max(_max_ratio(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
     return units, shares
 
 
-def _worst(found: FloatArray, unit: FloatArray | float) -> float:
+def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -248,7 +248,7 @@ class Sizes:
     accelerations: FloatArray
     rounding: FloatArray
 
-    def of_length(self, metres: float) -> Sizes:
+    def with_reach(self, metres: float) -> Sizes:
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
@@ -276,8 +276,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 reach += value
             if leader in names:
                 weights[joint.kind.turns][names.index(leader)] += factor
-    own = own_length(table)
-    reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
+    own = table_length(table)
+    reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
@@ -285,7 +285,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
-class _Slack:
+class _SnapEffect:
     """Largest effect of snapping (rounding the table's angles) on the quantities of a table.
 
     Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
@@ -303,6 +303,6 @@ class _Slack:
         self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
 
 
-def _halves(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest absolute values of the linear and of the angular rows of (n, 6, ...)."""
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

@@ -54,9 +54,9 @@ Verify = bool | Literal["sample"]
 SAMPLE = 100
 
 #: Maximum number of values that are compared at once, so that the values fit into the processor's cache.
-_PART_SIZE = 262_144
+_MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
-_MOST = 4096
+_MAX_CONFIGURATIONS = 4096
 
 
 class NotVerifiedWarning(UserWarning):
@@ -275,11 +275,11 @@ class Verifier:
             theirs=theirs[i, f],
             bound=EPS * bound.k * bound.scale,
             units=float(disagreement(ours[i, f], theirs[i, f], bound.scale).max()),
-            reproduce=self._replay(quantity, call, k, call.frames[f]),
+            reproduce=self._make_replay_line(quantity, call, k, call.frames[f]),
             oracle=self.library.title,
         )
 
-    def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
+    def _make_replay_line(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None
@@ -357,21 +357,21 @@ def comparison_with_oracle(
 ) -> BatchComparison:
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
-        _check_count(quantity, by, len(theirs), len(ours))
+        _check_result_count(quantity, by, len(theirs), len(ours))
         return compare(ours, theirs, bound, 2)
     bound, units, first = bound_of(quantity, x, by), np.empty(ours.shape[:2]), 0
-    with _not_finite_is_reported():
+    with _ignore_overflow():
         for theirs in oracle_blocks(quantity, oracle, x.query):
             part = slice(first, first + len(theirs))
             if part.stop > len(ours):
-                _check_count(quantity, by, part.stop, len(ours))
+                _check_result_count(quantity, by, part.stop, len(ours))
             scale = bound.scale if len(bound.scale) == 1 else bound.scale[part]
             units[part], first = worst_of_each(ours[part], theirs, scale, 2), part.stop
-    _check_count(quantity, by, first, len(ours))
+    _check_result_count(quantity, by, first, len(ours))
     return comparison_of(units, bound)
 
 
-def _check_count(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
+def _check_result_count(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
     if found != wanted:
         raise OracleError(
             f"{by.title} does not return the {quantity.name} of each configuration",
@@ -411,10 +411,10 @@ def own_results(quantity: Quantity, x: Part) -> FloatArray:
 
 
 #: Suppresses NumPy's warnings about inf and NaN, because the comparison reports these values.
-_not_finite_is_reported = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
+_ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 
-@_not_finite_is_reported()
+@_ignore_overflow()
 def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
     return quantity.ask(oracle, query)
 
@@ -442,7 +442,7 @@ def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
 
     The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
     """
-    step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
+    step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:
         drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
         yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))

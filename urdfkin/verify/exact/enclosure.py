@@ -38,7 +38,7 @@ from urdfkin.verify.quantities import (
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
 #: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
-LEAST_DIGITS, MOST_DIGITS = 15, 10_000
+MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
 
@@ -68,16 +68,16 @@ class Enclosure:
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Return whether each number of `x` is inside its interval; raise InputError for a wrong shape."""
-        x = self._alike(x)
+        x = self._check_shape(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
-        x = self._alike(x)
+        x = self._check_shape(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
 
-    def _alike(self, x: ArrayLike) -> FloatArray:
+    def _check_shape(self, x: ArrayLike) -> FloatArray:
         x = floats(x, f"the {self.quantity}")
         if x.shape != self.lower.shape:
             raise InputError(f"the {self.quantity} has the shape {self.lower.shape}", found=f"{x.shape}")
@@ -135,7 +135,7 @@ def enclose(
 ) -> Enclosures:
     """Return intervals that contain the true results of one frame for one sample."""
     if digits is not None:
-        digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
+        digits = whole_number(digits, "digits", MIN_DIGITS, MAX_DIGITS)
     tree = verifier.tree
     call = Call(tree, plan_of, as_str(frame, "frame"), reference, base, inputs)
     if call.shape:
@@ -160,9 +160,9 @@ def enclose(
         bounds = [(row, *_ENDS(row.truth(motion, link, call.reference))) for row in rows]
     oracle = None if verifier.cannot(base) else verifier.oracle(base)
 
-    def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
+    def make_enclosure(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
         ours = frozen(own_results(row, part)[0, 0])
         theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.query)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 
-    return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))
+    return Enclosures(frame, call.reference, digits, *(make_enclosure(*found) for found in bounds))

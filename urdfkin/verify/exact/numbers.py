@@ -34,20 +34,20 @@ from urdfkin.verify.bounds import DecimalErrors
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 DIGITS = 50
 #: Number of digits before the additional digit for each joint: twice the 15 decimal digits of a double.
-_TWO_DOUBLES = 30
+_BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
-_BITS = math.log2(10.0)
+_BITS_PER_DIGIT = math.log2(10.0)
 #: Number of additional bits of an interval; for example, 15 digits have 50 + 5 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
-_MORE_BITS = 5
+_ADDITIONAL_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
-_SIGNIFICANT = 17
+_SIGNIFICANT_DIGITS = 17
 #: Number of digits for the conversion of a midpoint to a decimal, before the decimal is rounded to 17 digits.
-_ALL_DIGITS = 200
+_CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
-_SPARE = 30
+_NEWTON_BITS = 30
 
-_ONE_THREAD = lock_over_forks()
+_precision_lock = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
@@ -56,7 +56,7 @@ def enough_digits(joints: int) -> int:
     Each joint on the path to the frame adds one digit. One digit is enough for the growth of the intervals: a
     joint with an oblique axis makes the intervals only about twice as wide.
     """
-    return _TWO_DOUBLES + joints
+    return _BASE_DIGITS + joints
 
 
 @contextmanager
@@ -66,7 +66,7 @@ def precision(digits: int) -> Iterator[None]:
     Arb has one precision for the whole process. A lock therefore allows only one thread at a time to run such
     a block.
     """
-    with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
+    with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
 
 
@@ -80,10 +80,10 @@ def ends(x: Number) -> tuple[float, float]:
     # This branch saves time, because most numbers of a large robot are the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
-    return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
+    return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
 
 
-def _outward(end: arb, towards: float) -> float:
+def _round_outward(end: arb, towards: float) -> float:
     """Round an exact number to a double in the direction `towards`."""
     found = float(end)
     inside = arb(found) > end if towards < 0.0 else arb(found) < end
@@ -109,11 +109,11 @@ def decimal(x: Number, negligible: float) -> str | None:
     if not radius <= abs(middle) * 1e-20:
         return None
     digits, power = middle.man_exp()
-    with localcontext(prec=_ALL_DIGITS):
+    with localcontext(prec=_CONVERSION_DIGITS):
         number = int(digits) * Decimal(2) ** int(power)
-    with localcontext(prec=_SIGNIFICANT, rounding=ROUND_HALF_EVEN):
+    with localcontext(prec=_SIGNIFICANT_DIGITS, rounding=ROUND_HALF_EVEN):
         rounded = (+number).normalize()
-    return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT else str(rounded)
+    return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT_DIGITS else str(rounded)
 
 
 class NumberType(NamedTuple):
@@ -169,17 +169,17 @@ def nearest_rotation(M: Matrix) -> Matrix:
     -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of each
     interval.
     """
-    with ctx.workprec(ctx.prec + _SPARE):
+    with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
-            steps = eq.product(M, _defect(M))
+            steps = eq.product(M, _orthogonality_defect(M))
             x, y, z = (eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, steps, strict=True))
             M = x, y, z
-        bound = arb(0, sum(abs(number) for row in _defect(M) for number in row).upper())
+        bound = arb(0, sum(abs(number) for row in _orthogonality_defect(M) for number in row).upper())
         x, y, z = ((a + bound, b + bound, c + bound) for a, b, c in M)
     return x, y, z
 
 
-def _defect(M: Matrix) -> Matrix:
+def _orthogonality_defect(M: Matrix) -> Matrix:
     """Return M^T M - I, which is 0 for a rotation."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
@@ -187,7 +187,7 @@ def _defect(M: Matrix) -> Matrix:
 
 
 #: First URDF version with the attribute `quat_xyzw`; older versions ignore the attribute.
-_WITH_QUATERNIONS = (1, 1)
+_FIRST_QUATERNION_VERSION = (1, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +229,7 @@ class _ExactText:
         self.kind = kind
         root = plain_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
-        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
+        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _FIRST_QUATERNION_VERSION
 
     def joint_of(self, joint: Joint, robot: str) -> ExactJoint:
         if joint.lock is not None:

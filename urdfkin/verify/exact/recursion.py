@@ -116,19 +116,19 @@ def move(
 
 def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
     s = motion.states[link]
-    return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
+    return _as_array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
 
 def velocity_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the velocity (6,) of a link, [linear; angular]."""
     s = motion.states[link]
-    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
+    return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
 def acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the classical acceleration (6,) of a link, [linear; angular]."""
     s = motion.states[link]
-    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
+    return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
@@ -141,17 +141,17 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
     if reference.at_world:
         linear = equations.point_velocity(linear, s.alpha, equations.minus((0, 0, 0), s.p))
-    return _array(_RECURSION.in_reference(s, reference, linear, s.alpha))
+    return _as_array(_RECURSION.in_reference(s, reference, linear, s.alpha))
 
 
 def jacobian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
-    return _array(found).reshape(motion.nv, 6).T
+    return _as_array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
-    return _array(found).reshape(motion.nv, 6).T
+    return _as_array(found).reshape(motion.nv, 6).T
 
 
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
@@ -159,9 +159,9 @@ def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDAr
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
         # Each number is multiplied separately, because NumPy cannot multiply an interval by an array.
-        out[of, by] += _array([factor * x for x in six])
+        out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
 
-def _array(numbers: Sequence[Any]) -> NDArray[np.object_]:
+def _as_array(numbers: Sequence[Any]) -> NDArray[np.object_]:
     return np.array(numbers, dtype=object)
