@@ -17,7 +17,7 @@ from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.tree import FloatArray, pose
-from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.oracle import free_flyer, free_flyer_velocity, nearest_quaternion
 
 ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', "0.6 0 0.8"))
@@ -108,14 +108,14 @@ def test_errors_on_a_rotated_base_are_well_within_the_bound(reference: str) -> N
     arm.jacobian(q, ["a", "b"], reference, base=base)
     arm.acceleration(q, v, a, ["a", "b"], reference, base=base)
     assert arm.certificate().verified
-    assert max(line.share for line in arm.certificate().lines) < 0.2
+    assert max(line.share_of_bound for line in arm.certificate().lines) < 0.2
 
 
 def test_only_a_rotated_base_counts_as_a_joint_in_the_bound() -> None:
     plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
-        (magnitudes(plan, q, None, None, state).roundings / ROUNDINGS).tolist()
+        (compute_magnitudes(plan, q, None, None, state).roundings / ROUNDINGS).tolist()
         for state in (STILL_STATE, BaseMotion(pose(p=[1.0, 2.0, 3.0])).state(()), turned.state(()))
     ]
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]

@@ -204,7 +204,7 @@ def check_line(certificate: Certificate) -> str:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
     parts = [
         f"{counted(line.checked, f'{line.quantity} result')}, worst disagreement {line.worst:.2g} eps*scale"
-        f" ({line.share:.1%} of the bound)"
+        f" ({line.share_of_bound:.1%} of the bound)"
         for line in certificate.lines
     ]
     return f"verified by {by}: {'; '.join(parts)}"

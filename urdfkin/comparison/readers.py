@@ -82,7 +82,7 @@ class LibraryReading:
 
 
 def installed(form: str = "urdf") -> tuple[str, ...]:
-    return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
+    return tuple(name for name, one in LIBRARIES.items() if form in one.formats and version(name) is not None)
 
 
 def compare_readers(
@@ -101,7 +101,7 @@ def compare_readers(
     source, form = _source(robot)
     names = installed(form) if libraries is None else tuple(libraries)
     if not names:
-        could = [one.package for one in LIBRARIES.values() if form in one.forms]
+        could = [one.package for one in LIBRARIES.values() if form in one.formats]
         raise InputError(
             f"no installed library reads {form.upper()}", remedy=f"pip install {' '.join(could)}"
         )
@@ -135,7 +135,7 @@ def _reading(
 ) -> LibraryReading:
     """Run a library in a separate process, and compare its poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
-    if form not in LIBRARIES[name].forms:
+    if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
     values = [values_of(robot, one) for one in q]
     command = own_python("from urdfkin.verify.adapters import main; main()")
@@ -148,7 +148,7 @@ def _reading(
     if "error" in answer:
         return LibraryReading(title, number, printable(answer["error"])[:_MOST_CHARACTERS])
     links = robot.link_names
-    tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].single else _TOLERANCE
+    tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].is_single_precision else _TOLERANCE
     tolerance *= max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in poses for poses in answer["poses"])]
     if not shared:

@@ -447,7 +447,7 @@ class Comparator:
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
-            if (reason := robot.verifier.cannot()) is not None:
+            if (reason := robot.verifier.find_refusal()) is not None:
                 return Confirmation("not verified", reason=reason)
         distances = self.pinocchio_distances(alignment, variables)
         for interval, metres in zip(frames, distances, strict=False):
@@ -458,7 +458,9 @@ class Comparator:
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
-        return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(distances.max(initial=0.0)))
+        return Confirmation(
+            "confirmed", PINOCCHIO.name_and_version, CONFIRMED, float(distances.max(initial=0.0))
+        )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
         """Compute each frame's largest distance (m) at `CONFIRMED` configurations with Pinocchio."""

@@ -36,7 +36,7 @@ def code_of_robot(
 ) -> FrameCode:
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
-    verify = bool(robot.verifier.policy_of_call(verify))
+    verify = bool(robot.verifier.resolve_policy(verify))
     if form == "tree":
         return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)

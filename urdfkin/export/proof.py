@@ -26,17 +26,17 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
 from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
-from urdfkin.verify.call import Call, Part
+from urdfkin.verify.call import Call, CallPart
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import (
     DIGITS,
-    conversion,
+    as_interval,
+    conversion_errors,
     enough_digits,
-    exact,
     precision,
-    read_exact,
+    read_exact_joints,
 )
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared with Pinocchio.
@@ -94,7 +94,7 @@ class Proof:
         else:
             verdict = [f"Verified by {oracle}, the expressions below evaluated {self.evaluated}:"] + [
                 f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
-                f" eps*scale, {line.share:.2%} of the bound"
+                f" eps*scale, {line.share_of_bound:.2%} of the bound"
                 for line in self.certificate.lines
             ]
         return [
@@ -159,7 +159,7 @@ def compare(
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
         found = evaluate(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.policy_of_call(verify)))
+        checker.check(function.quantity, call, found, bool(checker.resolve_policy(verify)))
     return checker.certificate()
 
 
@@ -175,20 +175,20 @@ def _vectors(
     link = tree.frame_link(frame)
     drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
     inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (drawn.q, drawn.v, drawn.a))
-    part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTORS))
+    part = Call(tree, plan_of, frame, reference, None, inputs).select(slice(0, VECTORS))
     within, single, largest = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
     path, found = tree.path(link), []
-    errors = conversion(verifier.text, tree, path, part.q)
+    errors = conversion_errors(verifier.text, tree, path, part.q)
     for f in functions:
         within[f.name], scale = _within(f, part, errors)
         single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
         shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
         largest[f.name] = float(shares.max(initial=0.0))
     with precision(DIGITS + enough_digits(len(path))):
-        joints = read_exact(verifier.text, tree, path)
+        joints = read_exact_joints(verifier.text, tree, path)
         for k in range(VECTORS):
-            motion = move(tree, joints, *(x[k] for x in inputs))
-            true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
+            motion = compute_motion(tree, joints, *(x[k] for x in inputs))
+            true = {f.name: f.quantity.enclose(motion, link, reference).ravel() for f in functions}
             found.append(
                 Vector(
                     tuple(x[k].tolist() for x in inputs),
@@ -200,7 +200,7 @@ def _vectors(
     return tuple(found), largest
 
 
-def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
+def _within(function: Function, part: CallPart, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds of a function's results, in eps, and the scales of these results.
 
     Both arrays have the shape (n, numbers). Each error bound is a factor k times the scale of the result.
@@ -216,7 +216,7 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
 
 def decimal(x: Number) -> str:
     """Return fifty digits of an interval, without final zeros; 0.0 if the interval contains 0."""
-    ball = exact(x)
+    ball = as_interval(x)
     if ball.contains(0):
         return "0.0"
     digits, e, exponent = ball.str(DIGITS, radius=False).partition("e")

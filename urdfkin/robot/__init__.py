@@ -49,7 +49,7 @@ from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, entry_of
-from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
+from urdfkin.verify.bounds import compute_magnitudes, find_active_entries, singularity_margin
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracles import OracleName
@@ -60,11 +60,11 @@ from urdfkin.verify.quantities import (
     PLACEMENT,
     QUANTITIES,
     RELATIVE_PLACEMENT,
-    quantity,
+    find_quantity,
     recursive_quantities,
 )
 from urdfkin.verify.singular_values import SingularValues, singular_values
-from urdfkin.verify.singularity import FrameColumns, axis_kinds
+from urdfkin.verify.singularity import FrameJacobian, find_revolute_columns
 from urdfkin.verify.verifier import Verifier, Verify
 
 if TYPE_CHECKING:
@@ -627,7 +627,7 @@ class Robot(Displayable):
         >>> bool(abs(T - robot.placement(q, "tool0")).max() < 1e-14)
         True
         """
-        return self.verifier.model(mimic=as_bool(mimic, "mimic"))
+        return self.verifier.make_pinocchio_model(mimic=as_bool(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
@@ -724,7 +724,7 @@ class Robot(Displayable):
         locked = configuration.locked_values(self.tree, lock, chosen)
         robot = copy(self)
         robot.tree = with_locks(self.tree, locked)
-        robot.verifier = self.verifier.locked(robot.tree, tuple(locked.items()))
+        robot.verifier = self.verifier.with_lock(robot.tree, tuple(locked.items()))
         robot._tip_frame = self._tip_frame if self._has_one_tip else None
         return robot
 
@@ -758,7 +758,7 @@ class Robot(Displayable):
         >>> arm.compute("velocity", ([0.0, 0.0], [1.0, 0.0]), "tip").tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        row = quantity(as_str(name, "name"))
+        row = find_quantity(as_str(name, "name"))
         if row not in recursive_quantities():
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
@@ -821,11 +821,11 @@ class Robot(Displayable):
         # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
-        to = call.flat(out, (4, 4))
+        to = call.flatten_out(out, (4, 4))
         self.verifier.require_pinocchio(verify)
-        T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
+        T_world = call.compute(PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads)
         T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
-        result = call.in_shape(T) if out is None else out
+        result = call.restore_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result
 
@@ -1062,16 +1062,16 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         J = self.jacobian(q, as_str(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
-        size = magnitudes(call.plan, call.q, None, None, call.state)
+        size = compute_magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
-        active = movable(call.plan)[0]
-        columns = FrameColumns(
+        active = find_active_entries(call.plan)[0]
+        columns = FrameJacobian(
             J,
             error,
             str(frame),
             self.rate_names,
-            axis_kinds(self.tree),
+            find_revolute_columns(self.tree),
             active,
             partial(self._sampled, frame),
             moving_base=base is not None,
@@ -1125,14 +1125,14 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
         self.verifier.require_pinocchio(verify)
-        if self.verifier.policy_of_call(verify):
-            nearest = max(nearest, nearest_singularity(call.plan))
+        if self.verifier.resolve_policy(verify):
+            nearest = max(nearest, singularity_margin(call.plan))
         rows = 7 if representation == "quaternion" else 6
-        to = call.flat(out, (rows, self.nv))
+        to = call.flatten_out(out, (rows, self.nv))
         J = np.empty((call.n, len(call.links), rows, self.nv)) if to is None else to
         walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
-        Rs = call.compute(PLACEMENT.ours, *walk, **state)[..., :3, :3]
-        Js_v = call.compute(JACOBIAN.ours, *walk, out=J if rows == 6 else None, **state)
+        Rs = call.compute(PLACEMENT.compute_results, *walk, **state)[..., :3, :3]
+        Js_v = call.compute(JACOBIAN.compute_results, *walk, out=J if rows == 6 else None, **state)
         too_near: list[tuple[float, int]] = []
 
         def compute(part: slice) -> None:
@@ -1148,10 +1148,10 @@ class Robot(Displayable):
         in_parts(compute, call.n, threads)
         if too_near:
             distance, k = min(too_near)
-            raise RepresentationSingularityError(representation, distance, call.index(k))
+            raise RepresentationSingularityError(representation, distance, call.batch_index(k))
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        result = call.in_shape(J) if out is None else out
+        result = call.restore_shape(J) if out is None else out
         self.verifier.check(ANALYTICAL_JACOBIAN, call, result, verify)
         return result
 
@@ -1196,7 +1196,7 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.require_pinocchio(verify)
-        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
+        to = call.flatten_out(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
             ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
@@ -1248,7 +1248,7 @@ class Robot(Displayable):
         >>> q, v, a = [0.3, -0.4], [1.0, 0.5], [0.0, 0.2]
         >>> proof = arm.enclose(q, v, a, arm.tip_frame)
         >>> J = arm.jacobian(q, arm.tip_frame)
-        >>> bool((proof.jacobian.error(J) < 4e-16).all())
+        >>> bool((proof.jacobian.error_bound(J) < 4e-16).all())
         True
         """
         with importing:
@@ -1527,8 +1527,8 @@ class Robot(Displayable):
             slide=as_str(slide, "slide"),
             like=like,
         )
-        if self.verifier.policy_of_call(verify):
-            self.verifier.table(table)
+        if self.verifier.resolve_policy(verify):
+            self.verifier.check_table(table)
         return table
 
     def screws(
@@ -1556,7 +1556,7 @@ class Robot(Displayable):
             from urdfkin.verify.conversions import check_screws
 
         found = screws_of(self.chain(tip, base))
-        if self.verifier.policy_of_call(verify):
+        if self.verifier.resolve_policy(verify):
             check_screws(self.verifier, found)
         return found
 
@@ -1578,8 +1578,8 @@ class Robot(Displayable):
             from urdfkin.dh.tree_parameters import tree_parameters
 
         parameters = tree_parameters(self.tree)
-        if self.verifier.policy_of_call(verify):
-            self.verifier.tree_parameters(parameters)
+        if self.verifier.resolve_policy(verify):
+            self.verifier.check_tree_parameters(parameters)
         return parameters
 
     # -- verification --------------------------------------------------------------------------------
@@ -1619,27 +1619,27 @@ class Robot(Displayable):
         row = QUANTITIES[name]
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
-        to = call.flat(out, row.own_shape(self.nv))
+        to = call.flatten_out(out, row.result_shape(self.nv))
         self.verifier.require_pinocchio(verify)
         results = call.compute(
-            row.ours,
+            row.compute_results,
             call.plan,
             (call.q, *call.rates),
             call.reference,
             base=call.state,
             out=to,
             threads=threads,
-            read=self.verifier.policy_of_call(verify) is True,
+            read=self.verifier.resolve_policy(verify) is True,
             **options,
         )
-        result = call.in_shape(results) if out is None else out
+        result = call.restore_shape(results) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
 
     def _sampled(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
-        J: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
+        J: FloatArray = call.compute(JACOBIAN.compute_results, call.plan, (call.q,), _ALIGNED)
         return J[:, 0]
 
     def _fast(

@@ -151,7 +151,9 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         lost = lost_quaternions(source, written[1])
         robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
-            robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
+            robot.verifier.source_notes = (
+                "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
+            )
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     streamed = source == "-" or hasattr(source, "read")
@@ -219,11 +221,11 @@ def _load_mjcf(
     read = read_mjcf(source, check=wanted)
     name = as_word(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
     text = Text(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
-    listed = of_mjcf(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
+    listed = of_mjcf(read.remarks, name, data.removeprefix(codecs.BOM_UTF8))
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
         verifier = _plain(robot, text, listed=listed, made=True).verifier
-        robot.verifier.reading = check_mjcf_source(verifier, read)
+        robot.verifier.source_notes = check_mjcf_source(verifier, read)
     return robot
 
 
@@ -237,7 +239,7 @@ def _load_usd(
     import hashlib
 
     from urdfkin.urdf.lint.rules.left_out import of_usd
-    from urdfkin.verify.usd_check import check_usd_source, read_usd, bound_single_precision_errors
+    from urdfkin.verify.usd_check import bound_single_precision_errors, check_usd_source, read_usd
 
     _refuse_arguments(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
@@ -263,7 +265,7 @@ def _load_usd(
     robot.single = bound_single_precision_errors(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]
     if wanted:
-        robot.verifier.reading = line
+        robot.verifier.source_notes = line
     return robot
 
 
@@ -294,7 +296,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     robot = robot_of(text, **how, made=True)
     if as_verify(how["verify"]):
         verifier = _plain(robot, text, made=True).verifier
-        robot.verifier.reading = check_model_source(verifier, read, source)
+        robot.verifier.source_notes = check_model_source(verifier, read, source)
     return robot
 
 

@@ -29,10 +29,10 @@ from urdfkin.validation import memory
 from urdfkin.validation.error_stats import CrossCheck, Inputs, Key, Tally, cross_check, tally
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
-from urdfkin.verify.quantities import SCREWS, Quantity, validated
+from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
 #: Number of samples in one draw.
 DRAWN = 25
@@ -179,11 +179,12 @@ class SecondOracleModel:
     def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> CrossCheck:
-        second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
+        second = block.timings.timed("second", row.ask_oracle, self.oracle, block.query(row, reference))
         bounds = (
-            row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
+            row.bound(block.plan, size, reference)
+            for size in (block.size, self.library.adapt_magnitudes(block.size))
         )
-        if row.of == "joints":
+        if row.object_kind == "joints":
             bounds = (block.joint_part(one) for one in bounds)
         return cross_check(self.library.name, ours, theirs, second, *bounds)
 
@@ -228,7 +229,7 @@ class _Block(_ComparisonBatch):
         # The robot's cache keeps the compiled tree for all frames, but not a compiled tree for some frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
-        self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
+        self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
         # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
         # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -243,10 +244,10 @@ class _Block(_ComparisonBatch):
         and the child link with different functions, so both results are compared.
         """
         inputs = self.x.q, self.x.v, self.x.a
-        for row in validated():
-            joints = [joint for joint in validated("joints") if joint.compute is row.compute]
+        for row in validated_quantities():
+            joints = [joint for joint in validated_quantities("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.timings.timed("urdfkin", row.ours, self.plan, inputs, reference)
+                ours = self.timings.timed("urdfkin", row.compute_results, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
@@ -257,11 +258,11 @@ class _Block(_ComparisonBatch):
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
-        joints = row.of == "joints"
+        joints = row.object_kind == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        return QueryBatch(frames, inputs, reference, joints=joints, divided=True)
+        return QueryBatch(frames, inputs, reference, frames_are_joints=joints, is_partial=True)
 
     def _compare(
         self,
@@ -271,8 +272,8 @@ class _Block(_ComparisonBatch):
         bound: Bound,
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
-        names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.timings.timed("pinocchio", row.ask, self.oracle, self.query(row, reference))
+        names = self.joint_names if row.object_kind == "joints" else self.frames
+        theirs = self.timings.timed("pinocchio", row.ask_oracle, self.oracle, self.query(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
             found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
@@ -289,9 +290,9 @@ class _Screws(_ComparisonBatch):
         robot, x = self.robot, self.x
         tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.timings.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(
-            1, 2
-        )
+        theirs = self.timings.timed(
+            "pinocchio", SCREWS.ask_oracle, self.oracle, QueryBatch((), (x.q,))
+        ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in memory.blocks(len(moving), memory.frame_bytes(len(x.q), tree.nv)):
@@ -304,8 +305,8 @@ class _Screws(_ComparisonBatch):
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
-        size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.timings.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        size = compute_magnitudes(plan, q, *still, STILL_STATE)
+        J = self.timings.timed("urdfkin", SCREWS.compute_results, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
@@ -341,7 +342,7 @@ def _load(chunk: Chunk) -> _Models:
     memory.check(robot.tree, chunk.samples + SPECIAL, most)  # The first chunk is the largest.
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
-        second = SecondOracleModel(by, robot.verifier.oracle(by=by))
+        second = SecondOracleModel(by, robot.verifier.oracle(library=by))
     found = robot, robot.verifier.oracle(), second
     _cache[chunk.subject] = found
     return found

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.comparison import worst_disagreements
 
 #: The libraries of a cross check, in the order of the columns of tables.
 CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
@@ -102,7 +102,7 @@ def cross_check(
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
-    units = worst_of_each(one, other, bound.scale, 2)
+    units = worst_disagreements(one, other, bound.scale, 2)
     share = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     agrees = share <= 1.0
     return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(share.max()))
@@ -209,7 +209,7 @@ def tally(
     n, count = ours.shape[:2]
     if not ours.size:
         return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)
-    units = worst_of_each(ours, theirs, bound.scale, 2)
+    units = worst_disagreements(ours, theirs, bound.scale, 2)
     share = units / result_k(bound, units.shape)
     k, f = divmod(int(share.argmax()), count)
     q, v, a = inputs[k]

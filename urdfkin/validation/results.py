@@ -101,7 +101,7 @@ class RobotReport:
             return None
         row = QUANTITIES[quantity]
         # The prefix "joint:" is needed because a link may have the same name.
-        frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+        frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
@@ -149,7 +149,7 @@ class RobotReport:
             "share_of_bound": tally.share,
             "bound": tally.bounds,
             "histogram": tally.histogram,
-            "subjects": QUANTITIES[quantity].of,
+            "subjects": QUANTITIES[quantity].object_kind,
             "worst_by_subject": tally.by_frame,
             "worst_case": worst_case,
         } | ({"second_oracle": tally.cross_check.as_dict()} if tally.cross_check else {})

@@ -200,7 +200,9 @@ def read_drake(text: str) -> LibraryModel:
     joint_of_child = {child: joint for joint, child in _find_child_links(text).items()}
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
     joints = {joint_of_child.get(j.name(), j.name()): j for j in moving}
-    bodies = [plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_find_robot_name(text)))]
+    bodies = [
+        plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_find_robot_name(text)))
+    ]
 
     def poses(values: Mapping[str, JointValue]) -> Poses:
         q = plant.GetPositions(context).copy()
@@ -351,7 +353,9 @@ def read_skrobot(text: str) -> LibraryModel:
     def poses(values: Mapping[str, JointValue]) -> Poses:
         for name in joints.keys() & values.keys():
             joints[name].joint_angle(_as_scalar(values[name]))
-        return _make_relative({link.name: link.worldcoords().T() for link in robot.link_list}, _find_root(text))
+        return _make_relative(
+            {link.name: link.worldcoords().T() for link in robot.link_list}, _find_root(text)
+        )
 
     return LibraryModel(list(joints), poses)
 
@@ -395,16 +399,16 @@ def read_newton(path: str) -> LibraryModel:
 class Library:
     """A library that reads robot files.
 
-    `package` is the name of the package that pip installs. `forms` lists the file formats that `read`
-    accepts. `single` is True if the library computes in single precision.
+    `package` is the name of the package that pip installs. `formats` lists the file formats that `read`
+    accepts. `is_single_precision` is True if the library computes in single precision.
     """
 
     title: str
     package: str
     module: str
     read: Callable[[str], LibraryModel]
-    forms: tuple[str, ...] = ("urdf",)
-    single: bool = False
+    formats: tuple[str, ...] = ("urdf",)
+    is_single_precision: bool = False
 
 
 LIBRARIES: dict[str, Library] = {
@@ -420,7 +424,7 @@ LIBRARIES: dict[str, Library] = {
         "Robotics Toolbox", "roboticstoolbox-python", "roboticstoolbox", read_roboticstoolbox
     ),
     "skrobot": Library("scikit-robot", "scikit-robot", "skrobot", read_skrobot),
-    "newton": Library("Newton", "newton", "newton", read_newton, ("usd",), single=True),
+    "newton": Library("Newton", "newton", "newton", read_newton, ("usd",), is_single_precision=True),
 }
 
 
@@ -430,7 +434,7 @@ def version(name: str) -> str | None:
     return None
 
 
-def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
+def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
     """Return the joints and link poses that a library computes, or the library's error message."""
     try:
         reading = LIBRARIES[name].read(case["text"])
@@ -448,7 +452,7 @@ def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
 
 def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
     for case in cases:
-        yield json.dumps({"name": case["name"], "version": version(name), **answer(name, case)})
+        yield json.dumps({"name": case["name"], "version": version(name), **evaluate_case(name, case)})
 
 
 def main() -> None:

@@ -5,9 +5,9 @@ Each number of a result is compared with the oracle's number. The result is acce
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. Large
-terms may cancel, so that both sums are small. The bound on their rounding errors is still proportional to the
-scale.
+terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
+orders. Large terms may cancel, so that both sums are small. The bound on their rounding errors is still
+proportional to the scale.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
@@ -33,12 +33,12 @@ For each joint, measured differences are below eps * scale, because rounding err
 sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared between small
 and large robots.
 
-*Magnitudes.* `magnitudes` replaces each vector by its length and evaluates the equations 7.58 and 7.127 to
-7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
-result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms differ
-by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this cross
-product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha therefore
-uses w_i instead of w_{i-1}.
+*Magnitudes.* `compute_magnitudes` replaces each vector by its length and evaluates the equations 7.58 and
+7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds
+the result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms
+differ by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this
+cross product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha
+therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Magnitudes:
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")
-def magnitudes(
+def compute_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
     """Return upper bounds on the terms of each frame's position, velocity and acceleration.
@@ -124,7 +124,9 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _BASE_VECTOR_INDICES)]
     for link in lengths.links:
-        states.append((_propagate_state if rates else _propagate_position)(link, states[link.parent + 1], q, *rates))
+        states.append(
+            (_propagate_state if rates else _propagate_position)(link, states[link.parent + 1], q, *rates)
+        )
     for end in lengths.ends:
         carried = (steps.carried if rates else _translate_position)(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
@@ -291,21 +293,23 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return k if k.shape == leading else np.broadcast_to(k, leading)
 
 
-def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with k = factors * `size.roundings`.
+def make_bound(
+    scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _ALIGNED
+) -> Bound:
+    """Return the bound with k = factors * `magnitudes.roundings`.
 
     The reference frames LOCAL and WORLD need one factor more than `factors`.
     """
     factors += reference is not _ALIGNED
-    k = factors * size.roundings
+    k = factors * magnitudes.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
 
 
 @_allow_overflow
-def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
+def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of urdfkin with MuJoCo.
 
-    `size` contains the upper bounds for a comparison with Pinocchio.
+    `magnitudes` contains the upper bounds for a comparison with Pinocchio.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
     `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
@@ -314,15 +318,15 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
     each joint, the bound allows `MUJOCO` = 30 instead of `ROUNDINGS` = 24 rounding errors.
     """
-    p = 2.0 * size.p
-    shared = eq.tangential(size.w, size.vel)
+    p = 2.0 * magnitudes.p
+    shared = eq.tangential(magnitudes.w, magnitudes.vel)
     return Magnitudes(
         p=p,
-        w=size.w,
-        vel=eq.point_velocity(size.vel, size.w, p),
-        alpha=size.alpha,
-        acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
-        roundings=2.0 * (MUJOCO / ROUNDINGS) * size.roundings,
+        w=magnitudes.w,
+        vel=eq.point_velocity(magnitudes.vel, magnitudes.w, p),
+        alpha=magnitudes.alpha,
+        acc=eq.point_acceleration(magnitudes.acc + shared, magnitudes.alpha, magnitudes.w, p),
+        roundings=2.0 * (MUJOCO / ROUNDINGS) * magnitudes.roundings,
     )
 
 
@@ -331,15 +335,15 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint, the
-            rules of both joints count.
+        rule_count: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint,
+            the rules of both joints count.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. If terms in a chain of mimic rules
             cancel each other, their rounding errors do not cancel. The added length of a prismatic mimic
             joint is then positive.
     """
 
     angles: FloatArray
-    rules: int
+    rule_count: int
     lengths: FloatArray
 
 
@@ -380,20 +384,22 @@ def true_value_magnitudes(
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
     """
-    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
-    more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
-    return replace(size, roundings=size.roundings + more)
+    magnitudes = compute_magnitudes(
+        replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE
+    )
+    more = errors.angles[:, np.newaxis] + 1.5 * errors.rule_count
+    return replace(magnitudes, roundings=magnitudes.roundings + more)
 
 
-def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
+def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
     The scale of a position is the length of the path. The scale of a rotation is 1, and the scale of the last
     row is 0.
     """
-    scale = np.zeros((*size.p.shape, 4, 4))
+    scale = np.zeros((*magnitudes.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
-    scale[..., :3, 3] = size.p[..., None]
+    scale[..., :3, 3] = magnitudes.p[..., None]
     return scale
 
 
@@ -425,16 +431,16 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
 
 @_allow_overflow
-def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on velocities [linear; angular], (n, frames, 6)."""
-    linear = size.vel
+    linear = magnitudes.vel
     if reference.at_world:
-        linear = eq.point_velocity(linear, size.w, size.p)
-    return _repeat_as_six_rows(linear, size.w)
+        linear = eq.point_velocity(linear, magnitudes.w, magnitudes.p)
+    return _repeat_as_six_rows(linear, magnitudes.w)
 
 
 @_allow_overflow
-def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
     Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel, so the scale
@@ -453,17 +459,19 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     - The bound allows 2 eps for the sums at each joint. This is more than the rounding errors of d_k and of
       the sum of 4 n terms.
     """
-    shared = eq.tangential(size.w, size.vel)
-    linear = size.acc + shared
+    shared = eq.tangential(magnitudes.w, magnitudes.vel)
+    linear = magnitudes.acc + shared
     if reference.at_world:
-        linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
-    return _repeat_as_six_rows(linear, size.alpha)
+        linear = eq.point_acceleration(linear + shared, magnitudes.alpha, magnitudes.w, magnitudes.p)
+    return _repeat_as_six_rows(linear, magnitudes.alpha)
 
 
 @_allow_overflow
-def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
+def imu_scale(magnitudes: Magnitudes, gravity: FloatArray) -> FloatArray:
     """Return the scale of the bound on IMU readings, (n, frames, 6), for a gravity vector (3,)."""
-    return _repeat_as_six_rows(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
+    return _repeat_as_six_rows(
+        magnitudes.acc + eq.tangential(magnitudes.w, magnitudes.vel) + norm(gravity), magnitudes.w
+    )
 
 
 def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
@@ -475,7 +483,7 @@ def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 @_allow_overflow
-def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
     A revolute joint's column is [z x d; z]. The scale is the length of the path in the linear rows, and 1 in
@@ -484,12 +492,12 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
     multiplied by |multiplier|, and is added to the scale of the mimicked joint.
     """
     turning, sliding = column_weights(plan)
-    linear, angular = eq.turning_column(turning, size.p[..., None])
+    linear, angular = eq.turning_column(turning, magnitudes.p[..., None])
     return _repeat_as_six_rows(linear + sliding, angular)
 
 
 @_allow_overflow
-def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
@@ -497,7 +505,7 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
-    w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
+    w, p, vel = magnitudes.w[..., None], magnitudes.p[..., None], magnitudes.vel[..., None]
     linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
     linear = linear + eq.axis_rate(w, sliding)
     if reference.own_axes:
@@ -520,7 +528,7 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 
 
 @_allow_overflow
-def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
@@ -554,12 +562,12 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
         np.add.at(turning, pair, both * np.where(before, near, far))
         np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
         np.add.at(angular, pair, both * (before != reference.own_axes))
-    linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
+    linear = product(turning, magnitudes.p[..., np.newaxis, np.newaxis]) + mixed
     return _repeat_as_six_rows(linear, angular)
 
 
 @_allow_overflow
-def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
+def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
     The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
@@ -581,14 +589,14 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
-    the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
+    the smallest possible value of s, which is `axis_sine` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
     contains. For this additional joint, the bound allows at least `ROUNDINGS` = 24 eps, so the bound covers
     the 13 eps.
 
-    `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
+    `bound` is the bound of the velocity Jacobian, and `axis_sine` (n, frames) is s of Pinocchio's rotation.
     """
-    s = apart - EPS * size.roundings
+    s = axis_sine - EPS * magnitudes.roundings
     # If s is not larger than its rounding error, the scale is not finite, and no result is accepted.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
@@ -620,7 +628,7 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return 1.5 * EPS * result_k(bound, leading)
 
 
-def nearest_singularity(plan: CompiledTree) -> float:
+def singularity_margin(plan: CompiledTree) -> float:
     """Return four times the error of a frame's rotation, rad.
 
     At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
@@ -646,7 +654,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     return weights[0], weights[1]
 
 
-def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
+def find_active_entries(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
     """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
 
     The linear rows of a revolute column are z x d. In WORLD, d leads from the joint to the root. Otherwise, d

@@ -36,7 +36,7 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointFrame, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.comparison import compare
 from urdfkin.verify.oracle import QueryBatch
@@ -66,7 +66,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     all joints on both paths of Pinocchio. The length in the bound is the distance of the first frame from the
     root plus the length of the chain, with prismatic displacements.
     """
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
     tree = verifier.tree
     names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
@@ -102,7 +102,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
     q, base, tip = _sample_base_and_tip(verifier, path.base, path.tip)
     values = path.coupling.values(path.coupling.select(verifier.tree, q))
@@ -114,7 +114,7 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
     q, base, tip = _sample_base_and_tip(verifier, screws.base_frame, screws.tip_frame)
     coordinates = screws.coupling.select(verifier.tree, q)
@@ -142,7 +142,9 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     )
 
 
-def _sample_base_and_tip(verifier: Verifier, base: str, tip: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _sample_base_and_tip(
+    verifier: Verifier, base: str, tip: str
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return random configurations, and Pinocchio's placements (n, 4, 4) of base and tip."""
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
@@ -196,21 +198,21 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     q = np.vstack((neutral(tree), sample(tree, _SAMPLE_COUNT, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=STILL_STATE)
     theirs = _model_placements(model, _model_configurations(model, tree, q), made)
     # The factor 2 in the bound allows for the rounded angles in the URDF text.
-    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
+    bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(
             "the robot made from a pinocchio.Model differs from the model",
             where=f"{tree.name}, {names[found.index[1]]}",
-            found=f"{found.share:.3g} times the bound of rounding, Pinocchio {version()}",
+            found=f"{found.share_of_bound:.3g} times the bound of rounding, Pinocchio {version()}",
             remedy="please report this as an error of urdfkin, with the model",
         )
     return (
         f"compared with the model itself: {len(names)} links agree in {len(q)} configurations"
-        f" ({found.share:.1%} of the bound)"
+        f" ({found.share_of_bound:.1%} of the bound)"
     )
 
 
@@ -245,7 +247,7 @@ def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> Flo
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
     """Compare Pinocchio's placements of the tip with the placements from the robot's table."""
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return
     q = sample(verifier.tree, _SAMPLE_COUNT, np.random.default_rng(0))
     own = table.coupling.select(verifier.tree, q)

@@ -30,8 +30,8 @@ from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.mjcf import Listed, is_text, name_of
 from urdfkin.urdf.mujoco import version
-from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.bounds import Bound, compute_magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
+from urdfkin.verify.comparison import worst_disagreements
 from urdfkin.verify.mjcf_process import MAX_OUTPUT_BYTES, parse_answers, unpack_array
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
@@ -47,13 +47,13 @@ _MAX_QUOTE_LENGTH = 300
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    `listed` contains elements of the file that the tree does not contain. `shapes_refusal` is the reason why
+    `remarks` contains elements of the file that the tree does not contain. `shapes_refusal` is the reason why
     MuJoCo compiled the file only without shapes and inertias. `pinocchio` is a report about Pinocchio's
     reader.
     """
 
     urdf: str
-    listed: tuple[Listed, ...]
+    remarks: tuple[Listed, ...]
     path: str | None
     answer: Mapping[str, Any]
     shapes_refusal: str | None
@@ -81,21 +81,21 @@ def read_mjcf(
         "seconds": ceil(timeout) + 1,
     }
     answers, ending = _ask_process(request, timeout)
-    read = [answer for answer in answers if "urdf" in answer]
-    if not read:
+    reading = [answer for answer in answers if "urdf" in answer]
+    if not reading:
         raise InputError(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
             remedy="check the file for very large numbers, for example in <replicate>",
         )
-    reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
+    reasons = [answer["shapes_refusal"] for answer in answers if "shapes_refusal" in answer]
     return MjcfReading(
-        read[-1]["urdf"],
-        tuple(Listed(*one) for one in read[-1]["listed"]),
+        reading[-1]["urdf"],
+        tuple(Listed(*one) for one in reading[-1]["listed"]),
         path,
-        read[-1],
-        None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_MAX_QUOTE_LENGTH],
+        reading[-1],
+        None if reading[-1]["whole"] else printable((reasons or [ending])[0])[:_MAX_QUOTE_LENGTH],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
@@ -115,20 +115,20 @@ def _ask_process(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[
     return parse_answers(output, status, library="MuJoCo", name=request["name"], timeout=timeout)
 
 
-def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
+def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
 
     Raises OracleError if placements or mimic rules differ by more than the bound. A missing or an additional
     joint equality in MuJoCo's model also raises OracleError.
     """
-    tree, answer = verifier.tree, read.answer
+    tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=STILL_STATE)
     # The factor 2 allows for the rounded angles in the URDF text.
-    size = mujoco_magnitudes(magnitudes(plan, q, None, None, STILL_STATE))
-    bound = PLACEMENT.bound(plan, size, None)
+    magnitudes = mujoco_magnitudes(compute_magnitudes(plan, q, None, None, STILL_STATE))
+    bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpack_array(answer["lengths"]), unpack_array(answer["angles"]))
     share = _compute_bound_shares(ours, _unpack_placements(answer["placements"]), bound)
@@ -144,9 +144,9 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     )
     if rules_share is not None:
         line += f", and {len(answer['rules'])} mimic rules agree ({rules_share:.1%})"
-    if read.shapes_refusal is not None:
-        line += f"; MuJoCo compiles the file only without shapes and inertias: {read.shapes_refusal}"
-    return f"{line}; {_compare_with_pinocchio(read, ours, bound)}"
+    if reading.shapes_refusal is not None:
+        line += f"; MuJoCo compiles the file only without shapes and inertias: {reading.shapes_refusal}"
+    return f"{line}; {_compare_with_pinocchio(reading, ours, bound)}"
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
@@ -192,21 +192,21 @@ def _unpack_placements(found: Mapping[str, Any]) -> FloatArray:
 
 
 def _compute_bound_shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    units = worst_of_each(ours, theirs, bound.scale, 2)
+    units = worst_disagreements(ours, theirs, bound.scale, 2)
     share: FloatArray = units / result_k(bound, units.shape)
     return share
 
 
-def _compare_with_pinocchio(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    if read.path is None:
+def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound) -> str:
+    if reading.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
-    found = read.pinocchio or {"error": "the process of the reader ended"}
+    found = reading.pinocchio or {"error": "the process of the reader ended"}
     if "error" in found:
         return f"not compared with Pinocchio's MJCF reader ({found['error']})"
     names = list(found["bodies"])
     if not names:
         return "Pinocchio's MJCF reader also finds no body"
-    places = [name for name, _ in read.answer["frames"]]
+    places = [name for name, _ in reading.answer["frames"]]
     bodies, theirs = [places.index(name) for name in names], _unpack_placements(found["placements"])
     share = _compute_bound_shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
     if (share <= 1.0).all():

@@ -51,7 +51,7 @@ def serve() -> None:
             with suppress(InstallationError):
                 pinocchio()
         limit(request["seconds"])
-        for answer in answers(request):
+        for answer in compute_answers(request):
             write_answer(answer)
     except Exception as error:
         write_answer(make_error_answer(error, "MuJoCo cannot compile this MJCF"))
@@ -98,7 +98,7 @@ def parse_answers(
     return answers, f"{library}'s process ended with status {status}: perhaps {_MEMORY_HINT}"
 
 
-def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
 
     `samples` is the number of random configurations besides the zero configuration; 0: no configurations.
@@ -118,7 +118,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo compiles the file, but the result is not a tree.
             found = error.found if isinstance(error, InputError) else str(error)
-            yield {"not_whole": _add_memory_hint(found) or _MEMORY_HINT}
+            yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:
         yield {"pinocchio": _compute_with_pinocchio(path, read, q)}
 

@@ -50,7 +50,10 @@ _MASS = "1"
 #: MuJoCo itself rejects chains of more than 1,023 links, but only after the loading time.
 _MAX_DEPTH = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
-_REPLACEMENT_JOINTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
+_REPLACEMENT_JOINTS = {
+    "planar": ("slide x", "slide y", "hinge"),
+    "floating": ("slide x", "slide y", "slide z", "ball"),
+}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: Number of coordinates and number of joint velocities of a joint in urdfkin, by the kind of the joint.
 #: All other kinds have one coordinate and one joint velocity.
@@ -101,9 +104,9 @@ class MujocoOracle(Oracle):
         except (ValueError, KeyError, ExpatError) as error:
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
-        coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        locked = find_locked_values(self.lock, coupled)  # Locked joints stay in MuJoCo's model.
-        rules = self.rules([name for name in moving if name not in locked])
+        lock_mimic_joints = mimic_rules(text, moving, tree.name) if self.mimic else {}
+        locked = find_locked_values(self.lock, lock_mimic_joints)  # Locked joints stay in MuJoCo's model.
+        rules = self.read_rules([name for name in moving if name not in locked])
         base = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if base else []), *links])}
         self._model = self._compile_model([*base, *joints], links[0])
@@ -202,7 +205,10 @@ class MujocoOracle(Oracle):
         # A spatial acceleration can be shifted to the world origin; a classical acceleration cannot.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
-        out, velocity = _change_reference(x.reference, poses, spatial), _change_reference(x.reference, poses, velocity)
+        out, velocity = (
+            _change_reference(x.reference, poses, spatial),
+            _change_reference(x.reference, poses, velocity),
+        )
         out[..., :3] += np.cross(velocity[..., 3:], velocity[..., :3])
         return out
 
@@ -249,14 +255,16 @@ class MujocoOracle(Oracle):
 
         return self._compute_poses(x, count, read), velocity, acceleration
 
-    def _compute_poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
+    def _compute_poses(
+        self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
+    ) -> FloatArray:
         """Return placements (n, frames, 4, 4); call `read(body, (k, f))` for each sample k and frame f.
 
         MuJoCo receives the first `count` of the inputs q, v and a. `read` can read further results from
         `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
-        bodies = [self._frames.index(name) for name in x.frames]
+        bodies = [self._frames.find_index(name) for name in x.frames]
         out = np.zeros((len(x.q), len(bodies), 4, 4))
         out[..., 3, 3] = 1.0
         qpos, rates, second = self._convert_inputs(x, count)
@@ -292,7 +300,9 @@ class MujocoOracle(Oracle):
 
     # -- layout --------------------------------------------------------------------------------------
 
-    def _convert_inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    def _convert_inputs(
+        self, x: QueryBatch, count: int
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for joint in self._indices:

@@ -168,7 +168,7 @@ class PinocchioLayout:
             np.array([joint.offset for joint in joints]),
         )
 
-    def configurations(self, q: FloatArray) -> FloatArray:
+    def convert_q(self, q: FloatArray) -> FloatArray:
         """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
         if self._same_q:
             return np.ascontiguousarray(q)
@@ -189,7 +189,7 @@ class PinocchioLayout:
                 full[:, i + 2], full[:, i + 3] = np.cos(q[:, k + 2]), np.sin(q[:, k + 2])
         return full
 
-    def rates(self, v: FloatArray) -> FloatArray:
+    def convert_rates(self, v: FloatArray) -> FloatArray:
         """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
         if self._same_v:
             return np.ascontiguousarray(v)
@@ -202,7 +202,7 @@ class PinocchioLayout:
         """Return the Jacobian J_full G for urdfkin's v, without the base's columns."""
         if self._same_v:
             return full
-        return coupled(full, self._columns, self._index, self._factor, self.nv)
+        return couple_columns(full, self._columns, self._index, self._factor, self.nv)
 
 
 #: Pinocchio's name of the world, the parent of a root joint.
@@ -229,7 +229,7 @@ class Frames:
         self._oracle, self._robot = oracle, robot
         self._bodies, self._joints, self._parents = bodies, joints, parents
 
-    def index(self, name: str) -> int:
+    def find_index(self, name: str) -> int:
         """Return the index of a frame; raise OracleError for an unknown or ambiguous name."""
         if isinstance(name, LinkFrame):
             return self._find_index(self._bodies, name, str(name)[5:])
@@ -352,9 +352,9 @@ class _CoordinateNames:
     """Map names of joints and coordinates to indices in q or v.
 
     >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _Q_SUFFIXES)
-    >>> names.place("base.y"), names.place("base"), names.place("elbow")
+    >>> names.find_index("base.y"), names.find_index("base"), names.find_index("elbow")
     (1, slice(0, 3, None), 3)
-    >>> names.pairs("ready, base.x = 5mm, elbow=pi / 2")
+    >>> names.split_pairs("ready, base.x = 5mm, elbow=pi / 2")
     [('base.x', '5mm'), ('elbow', 'pi / 2')]
     """
 
@@ -364,7 +364,7 @@ class _CoordinateNames:
             self._joints[joint] = at, suffixes.get(rates, ())
             at += len(suffixes.get(rates, "1"))
 
-    def place(self, name: str) -> int | slice:
+    def find_index(self, name: str) -> int | slice:
         """Return a coordinate's index or a joint's slice; raise OracleError for an unknown name."""
         if name in self._joints:
             at, suffixes = self._joints[name]
@@ -375,7 +375,7 @@ class _CoordinateNames:
                 return at + suffixes.index(suffix)
         raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
-    def pairs(self, text: str) -> list[tuple[str, str]]:
+    def split_pairs(self, text: str) -> list[tuple[str, str]]:
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
@@ -409,10 +409,10 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments that an oracle receives for n configurations.
 
-    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `joints` is True, `frames`
-    contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `frames_are_joints` is True,
+    `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
 
-    If `divided` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
+    If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
     frame may round differently from its function for several frames. Therefore, Pinocchio uses the function
     for several frames even if `frames` contains one frame.
     """
@@ -421,8 +421,8 @@ class QueryBatch(NamedTuple):
     inputs: tuple[FloatArray, ...]
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
     base: BaseNumbers | None = None
-    joints: bool = False
-    divided: bool = False
+    frames_are_joints: bool = False
+    is_partial: bool = False
 
     @property
     def q(self) -> FloatArray:
@@ -438,9 +438,9 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The user's arguments of one call, which `rows` converts for an oracle.
+    """The user's arguments of one call, which `select` converts for an oracle.
 
-    `named` has an entry for each input: the user's text or mapping with names, or None for an array.
+    `named_inputs` has an entry for each input: the user's text or mapping with names, or None for an array.
     `joints` lists the name and the number of joint velocities of each joint that has coordinates.
     """
 
@@ -450,15 +450,15 @@ class OracleQuery:
         reference: Reference | str,
         base: BaseNumbers | None,
         inputs: Sequence[ArrayLike],
-        named: Sequence[str | Mapping[str, ArrayLike] | None] = (),
+        named_inputs: Sequence[str | Mapping[str, ArrayLike] | None] = (),
         joints: Sequence[tuple[str, int]] = (),
     ) -> None:
         self._is_one = isinstance(frame, str)
         self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
         self.reference, self.base = reference, base
-        self._arrays, self._named, self._joints = inputs, named or [None] * len(inputs), joints
+        self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
-    def read(self) -> None:
+    def convert_inputs(self) -> None:
         """Convert the inputs before the computation writes to `out`, which may share memory with an input."""
         _ = self._inputs
 
@@ -466,17 +466,26 @@ class OracleQuery:
     def _inputs(self) -> tuple[FloatArray, ...]:
         return tuple(
             np.asarray(x, dtype=np.float64)
-            if named is None
-            else self._set_named_values(np.array(x, float), named, of)
-            for x, named, of in zip(self._arrays, self._named, (_Q_SUFFIXES, _VELOCITY_SUFFIXES, _VELOCITY_SUFFIXES), strict=False)
+            if named_inputs is None
+            else self._set_named_values(np.array(x, float), named_inputs, of)
+            for x, named_inputs, of in zip(
+                self._arrays, self._named, (_Q_SUFFIXES, _VELOCITY_SUFFIXES, _VELOCITY_SUFFIXES), strict=False
+            )
         )
 
     def _set_named_values(
-        self, x: FloatArray, named: str | Mapping[str, ArrayLike], suffixes: Mapping[int, tuple[str, ...]]
+        self,
+        x: FloatArray,
+        named_inputs: str | Mapping[str, ArrayLike],
+        suffixes: Mapping[int, tuple[str, ...]],
     ) -> FloatArray:
         names = _CoordinateNames(self._joints, suffixes)
-        for name, value in named.items() if isinstance(named, Mapping) else names.pairs(named):
-            x[..., names.place(name)] = _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
+        for name, value in (
+            named_inputs.items() if isinstance(named_inputs, Mapping) else names.split_pairs(named_inputs)
+        ):
+            x[..., names.find_index(name)] = (
+                _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
+            )
         return x
 
     @cached_property
@@ -491,7 +500,7 @@ class OracleQuery:
     def n(self) -> int:
         return math.prod(self.shape)
 
-    def rows(self, part: slice | IntArray) -> QueryBatch:
+    def select(self, part: slice | IntArray) -> QueryBatch:
         """Return the configurations with the indices `part` in the flat batch (C order)."""
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
@@ -507,7 +516,7 @@ class OracleQuery:
             base = BaseRows(pick(base.placement, 2), pick(base.velocity), pick(base.acceleration))
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
-    def flat(self, result: FloatArray, axes: int) -> FloatArray:
+    def flatten_result(self, result: FloatArray, axes: int) -> FloatArray:
         """Return `result` in the shape (n, frames, ...).
 
         `axes` is the number of axes of the result for one configuration and one frame. Raises OracleError if
@@ -560,7 +569,7 @@ class Oracle:
         self.text, self.tree, self.mimic = text, tree, mimic
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
-    def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
+    def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the mimic rules of `joints`, the library's moving joints.
 
         Raises OracleError if the joints or their order differ from the tree's.
@@ -621,7 +630,9 @@ class Oracle:
         return np.where(out[..., 3:] < 0.0, -out, out)
 
 
-def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
+def couple_columns(
+    full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
+) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
@@ -640,7 +651,9 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
 
 
 @np.errstate(all="ignore")
-def _couple_rows(rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
+def _couple_rows(
+    rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
+) -> FloatArray:
     sums = np.zeros((len(rows), nv))
     for column in columns:
         sums[:, index[column]] += rows[:, column] * factor[column]

@@ -32,11 +32,11 @@ from urdfkin.verify.oracle import (
     Oracle,
     PinocchioLayout,
     QueryBatch,
-    make_pinocchio_frames,
-    free_flyer,
-    free_flyer_velocity,
-    free_flyer_acceleration,
     find_locked_values,
+    free_flyer,
+    free_flyer_acceleration,
+    free_flyer_velocity,
+    make_pinocchio_frames,
     mimic_rules,
 )
 
@@ -131,7 +131,7 @@ def build_model(
     *,
     mimic: bool = False,
     lock: Mapping[str, float] = MappingProxyType({}),
-    coupled: bool = True,
+    lock_mimic_joints: bool = True,
 ) -> Any:
     """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
 
@@ -139,7 +139,7 @@ def build_model(
     is therefore rejected. A long chain of links is parsed with a larger stack.
 
     `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
-    With `coupled`, the joints that mimic a locked joint are also locked.
+    With `lock_mimic_joints`, the joints that mimic a locked joint are also locked.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -153,12 +153,12 @@ def build_model(
         model = _parse(text, tree, root_joint, mimic)
     else:
         model = with_stack(depth * _STACK_BYTES_PER_LINK, lambda: _parse(text, tree, root_joint, mimic))
-    return _reduce_model(model, text, lock, coupled=coupled) if lock else model
+    return _reduce_model(model, text, lock, lock_mimic_joints=lock_mimic_joints) if lock else model
 
 
-def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool) -> Any:
+def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimic_joints: bool) -> Any:
     pin, q = pinocchio(), pinocchio().neutral(model)
-    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
+    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
     locked = find_locked_values(lock, rules)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
@@ -206,13 +206,13 @@ class PinocchioOracle(Oracle):
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
         super().__init__(text, tree, **how)
         self._pin = pin = pinocchio()
-        self._model = build_model(text, tree, self.root_joint, lock=self.lock, coupled=self.mimic)
+        self._model = build_model(text, tree, self.root_joint, lock=self.lock, lock_mimic_joints=self.mimic)
         names = list(self._model.names)[1:]
         self._frames = make_pinocchio_frames(self._model, pin, includes_world=self.root_joint is not None)
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if self.moving_base:
             joints, self._index = self._add_free_flyer(joints)
-        self._layout = PinocchioLayout(self._model, joints, names, self.rules(names))
+        self._layout = PinocchioLayout(self._model, joints, names, self.read_rules(names))
         self._joint_ids = dict(zip(names, joints, strict=True))
         self.new_data = self._model.createData
 
@@ -236,9 +236,9 @@ class PinocchioOracle(Oracle):
         )
 
     def _find_ids(self, x: QueryBatch) -> list[int]:
-        if x.joints:
+        if x.frames_are_joints:
             return [self._joint_ids[name.partition(":")[2]] for name in x.frames]
-        return [self._index[self._frames.index(name)] for name in x.frames]
+        return [self._index[self._frames.find_index(name)] for name in x.frames]
 
     def _convert_reference(self, reference: Reference | str) -> Any:
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
@@ -250,7 +250,7 @@ class PinocchioOracle(Oracle):
         If the base moves, the velocity and the spatial acceleration of the free-flyer are in the base's axes.
         """
         q, *v_and_a = x.inputs[:count]
-        full = [self._layout.configurations(q), *map(self._layout.rates, v_and_a)]
+        full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
         if self.moving_base and x.base is not None:
@@ -288,14 +288,14 @@ class PinocchioOracle(Oracle):
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        if len(x.frames) == 1 and not (x.joints or x.divided):
+        if len(x.frames) == 1 and not (x.frames_are_joints or x.is_partial):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
             return self._layout.couple(_stack_results(self._frame_jacobians(x), *shape))
-        get = pin.getJointJacobian if x.joints else pin.getFrameJacobian
+        get = pin.getJointJacobian if x.frames_are_joints else pin.getFrameJacobian
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
+        if len(x.frames) != 1 or x.frames_are_joints or x.is_partial or not self._model.nv:
             yield self.jacobians(x)
             return
         memory = np.empty((min(len(x.q), _block_length(6, self._model.nv)), 1, 6, self._model.nv))
@@ -304,19 +304,27 @@ class PinocchioOracle(Oracle):
 
     def _frame_jacobians(self, x: QueryBatch) -> _NextResults:
         (one,), wanted = self._find_ids(x), self._convert_reference(x.reference)
-        found = self._map_configurations(self._pin.computeFrameJacobian, self._convert_inputs(x, 1), one, wanted)
+        found = self._map_configurations(
+            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), one, wanted
+        )
         return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
+        get = pin.getJointJacobianTimeVariation if x.frames_are_joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
 
     def _columns(
         self, x: QueryBatch, count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
     ) -> FloatArray:
-        inputs, ids, wanted = self._convert_inputs(x, count), self._find_ids(x), self._convert_reference(x.reference)
-        return self._layout.couple(self._collect_results((6, self._model.nv), inputs, compute, get, ids, wanted))
+        inputs, ids, wanted = (
+            self._convert_inputs(x, count),
+            self._find_ids(x),
+            self._convert_reference(x.reference),
+        )
+        return self._layout.couple(
+            self._collect_results((6, self._model.nv), inputs, compute, get, ids, wanted)
+        )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
         """Return Hessians (n, frames, 6, nv, nv) by `getFrameKinematicHessian`.

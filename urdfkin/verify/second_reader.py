@@ -64,7 +64,7 @@ class SecondReading:
     unread: str | None = None
 
 
-def second_reading(
+def compare_with_yourdfpy(
     text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.

@@ -36,31 +36,31 @@ _NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class FrameColumns:
+class FrameJacobian:
     """A robot's Jacobian, with the names of its frame and of its joints.
 
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
         error: (..., 6, nv) bound on the error of each number of J.
-        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint, None
-            for a column that does not belong to a single joint axis.
-        active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
-        samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
+        is_revolute: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint,
+            None for a column that does not belong to a single joint axis.
+        active_entries: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
         moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
-            `samples`, which have a fixed base.
+            `sample_jacobians`, which have a fixed base.
     """
 
     J: FloatArray
     error: FloatArray
     frame: str
     joints: tuple[str, ...]
-    turns: tuple[bool | None, ...]
-    active: NDArray[np.bool_]
-    samples: Callable[[], FloatArray]
+    is_revolute: tuple[bool | None, ...]
+    active_entries: NDArray[np.bool_]
+    sample_jacobians: Callable[[], FloatArray]
     moving_base: bool
 
 
-def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
+def find_revolute_columns(tree: KinematicTree) -> tuple[bool | None, ...]:
     turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
@@ -76,44 +76,44 @@ class Singularity(Displayable):
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full: Largest possible rank: the smaller of the numbers of rows and columns.
-        least: Upper bound on the smallest singular value.
-        lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
-            Jacobian has more rows than columns.
-        motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
+        full_rank: Largest possible rank: the smaller of the numbers of rows and columns.
+        smallest_value_bound: Upper bound on the smallest singular value.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty
+            if the Jacobian has more rows than columns.
+        null_motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons of the loss.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
     >>> found = arm.singular_values([0.0, 0.0], "tip", "linear").singularity()
-    >>> found.rank, found.full, found.lost.tolist()
+    >>> found.rank, found.full_rank, found.lost_directions.tolist()
     (1, 2, [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
     """
 
     rank: int
-    full: int
-    least: float
-    lost: FloatArray
-    motions: FloatArray
+    full_rank: int
+    smallest_value_bound: float
+    lost_directions: FloatArray
+    null_motions: FloatArray
     reasons: tuple[str, ...]
 
     def __bool__(self) -> bool:
         """Whether the Jacobian is singular within rounding."""
-        return self.rank < self.full
+        return self.rank < self.full_rank
 
     def __repr__(self) -> str:
-        return f"<Singularity: rank {self.rank} of {self.full}>"
+        return f"<Singularity: rank {self.rank} of {self.full_rank}>"
 
     def _sheet(self) -> TextDocument:
-        title = f"rank {self.rank} of {self.full}"
+        title = f"rank {self.rank} of {self.full_rank}"
         if not self:
             return TextDocument(f"Not singular: {title}.")
-        where = f"sigma_{self.full} is at most {self.least:.2g}"
+        where = f"sigma_{self.full_rank} is at most {self.smallest_value_bound:.2g}"
         return TextDocument(f"Singular within rounding: {title}; {where}.", self.reasons)
 
 
-def explain(
-    columns: FrameColumns, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
+def explain_singularity(
+    columns: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
     """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
@@ -127,12 +127,12 @@ def explain(
 
 
 class _Explanation:
-    def __init__(self, columns: FrameColumns, sample: tuple[int, ...], rows: slice, rank: int) -> None:
+    def __init__(self, columns: FrameJacobian, sample: tuple[int, ...], rows: slice, rank: int) -> None:
         J, error = columns.J[sample], columns.error[sample]
         chosen = np.zeros(6, dtype=bool)
         chosen[rows] = True
         self._linear_only, self._angular_only = not chosen[3:].any(), not chosen[:3].any()
-        active = columns.active & chosen[:, None]
+        active = columns.active_entries & chosen[:, None]
         self._rows, self._moving = np.flatnonzero(active.any(axis=1)), np.flatnonzero(active.any(axis=0))
         self._J, self._error, self._columns, self._rank = J, error, columns, rank
         self._A = J[np.ix_(self._rows, self._moving)]
@@ -166,7 +166,7 @@ class _Explanation:
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
         """Return the rank at random configurations, and a basis of the directions lost in all of them."""
-        samples = self._columns.samples()[:, self._rows[:, None], self._moving]
+        samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return usual, U[:, int((s > _NEGLIGIBLE * s[0]).sum()) :]
@@ -226,12 +226,14 @@ class _Explanation:
 
     def _describe_dependence(self, one: tuple[int, ...]) -> str:
         indices = self._moving[list(one)]
-        turns = [self._columns.turns[i] for i in indices]
+        turns = [self._columns.is_revolute[i] for i in indices]
         reason = None
         if None not in turns:
             if self._angular_only:
                 parallel = np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1
-                reason = f"The axes of {self._name_joints(one)} are parallel{'' if parallel else ' to one plane'}."
+                reason = (
+                    f"The axes of {self._name_joints(one)} are parallel{'' if parallel else ' to one plane'}."
+                )
             elif self._linear_only:
                 reason = self._describe_linear_rows(one, turns)
             elif all(turns):
@@ -281,15 +283,15 @@ class _Explanation:
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
-        if not all(self._columns.turns[i] for i in self._moving):
+        if not all(self._columns.is_revolute[i] for i in self._moving):
             return None
         off = 4.0 * self._matrix_error() * (1.0 + np.abs(self._A).max())
         if abs(f @ m) > off * float(f @ f):
             return None
         point = np.cross(f, m) / (f @ f)
         return (
-            f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))} through"
-            f" the point at {_format_vector(point)} m from the origin of {self._columns.frame}."
+            f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))}"
+            f" through the point at {_format_vector(point)} m from the origin of {self._columns.frame}."
         )
 
     def _describe_null_motion(self, motion: FloatArray) -> str:

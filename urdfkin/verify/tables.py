@@ -17,9 +17,9 @@ that are close to a multiple of 15 degrees. If snapping has changed a table, the
 effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
 the length of the path from the root to the table's base plus the length of the path from the root to the tip.
 Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum instead of the reach, but at most `MAX_LENGTH_RATIO` times the reach. In a table with
-Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic rules. The
-bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
+reach, the bound uses this sum instead of the reach, but at most `MAX_LENGTH_RATIO` times the reach. In a
+table with Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic
+rules. The bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -69,10 +69,10 @@ class TableCheck:
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
-            quantity's scale. The scale is computed from `Sizes`; the scale of an angle is 1.
-        shares: Ratio of the difference to its bound, for the same three quantities. A ratio above 1 is a
-            disagreement, unless `loss` explains the difference.
-        snapped: Whether snapping changed the table. The bound then includes the effect of snapping.
+            quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
+        shares_of_bound: Ratio of the difference to its bound, for the same three quantities. A ratio above 1
+            is a disagreement, unless `loss` explains the difference.
+        has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
         loss: Explanation of a difference above the bound, if very large lengths in the table cause the
             difference. Otherwise None.
     """
@@ -81,17 +81,17 @@ class TableCheck:
     metres: float
     radians: float
     units: dict[str, float]
-    shares: dict[str, float]
-    snapped: bool
+    shares_of_bound: dict[str, float]
+    has_snapping: bool
     loss: str | None = None
 
     @property
-    def within(self) -> bool:
-        return all(share <= 1.0 for share in self.shares.values())
+    def is_within_bounds(self) -> bool:
+        return all(share <= 1.0 for share in self.shares_of_bound.values())
 
     @property
     def agrees(self) -> bool:
-        return self.within or self.loss is not None
+        return self.is_within_bounds or self.loss is not None
 
     def __str__(self) -> str:
         if self.loss is not None:
@@ -99,9 +99,9 @@ class TableCheck:
                 f"the table LOSES {self.metres * 1e3:.2g} mm and {self.radians:.2g} rad to rounding on"
                 f" {self.samples} samples: {self.loss}"
             )
-        bound = "rounding and snapping" if self.snapped else "rounding"
-        figures = self.shares if self.snapped else self.units
-        unit, form = ("of the bound", ".0%") if self.snapped else ("in eps*scale", ".2g")
+        bound = "rounding and snapping" if self.has_snapping else "rounding"
+        figures = self.shares_of_bound if self.has_snapping else self.units
+        unit, form = ("of the bound", ".0%") if self.has_snapping else ("in eps*scale", ".2g")
         worst = ", ".join(f"{name} {value:{form}}" for name, value in figures.items())
         verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"
         return (
@@ -114,7 +114,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
-    motion = relative_motion(oracle, tree, table, samples)
+    motion = compute_relative_motion(oracle, tree, table, samples)
     T = table.placement(own_q)
     differences = {
         "placement": (
@@ -124,7 +124,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
         "jacobian": _split_rows(jacobian(table, own_q) - motion.jacobian[..., columns]),
         "acceleration": _split_rows(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
     }
-    size = sizes(tree, table, samples)
+    size = compute_error_scales(tree, table, samples)
     snap_effect = _SnapEffect(table, own_q, size)
     units, shares = _compare_with_bounds(differences, size, snap_effect)
     loss = None
@@ -161,7 +161,7 @@ _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
 def _compare_with_bounds(
-    differences: _Differences, size: Sizes, snap_effect: _SnapEffect
+    differences: _Differences, size: ErrorScales, snap_effect: _SnapEffect
 ) -> tuple[dict[str, float], dict[str, float]]:
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(size.reach)
@@ -201,7 +201,9 @@ class RelativeMotion:
     acceleration: FloatArray
 
 
-def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
+def compute_relative_motion(
+    oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples
+) -> RelativeMotion:
     x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
     T = oracle.placements(x)
     R = T[:, 0, :3, :3]
@@ -227,7 +229,7 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 
 @dataclass(frozen=True, slots=True)
-class Sizes:
+class ErrorScales:
     """Lengths and velocities to which the bounds on rounding errors are proportional.
 
     Attributes:
@@ -248,11 +250,11 @@ class Sizes:
     accelerations: FloatArray
     rounding: FloatArray
 
-    def with_reach(self, metres: float) -> Sizes:
+    def with_reach(self, metres: float) -> ErrorScales:
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
-def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
+def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) -> ErrorScales:
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -282,7 +284,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
-    return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
+    return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
 class _SnapEffect:
@@ -293,7 +295,7 @@ class _SnapEffect:
     by at most twice this amount. The cross product of two axes changes by at most 2 * turn.
     """
 
-    def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
+    def __init__(self, table: DHTable, own_q: FloatArray, size: ErrorScales) -> None:
         self.turn, self.metres = 0.0, np.zeros(len(own_q))
         if table.snap is not None:
             values = table.coupling.values(own_q)

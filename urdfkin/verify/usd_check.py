@@ -105,18 +105,18 @@ def read_usd(
     return UsdReading(answer["urdf"], tuple(Remark(*one) for one in answer["remarks"]), str(path), answer)
 
 
-def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
+def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[Remark, ...]]:
     """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
     Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
     """
-    joints = read.answer["joints"]
+    joints = reading.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
         f"compared with OpenUSD {version()}: UsdPhysics and urdfkin read the same {len(joints)} joints"
         f" ({share:.1%} of the bound of single precision)"
     )
-    rest, remarks = _compare_prims(verifier.tree, read.answer)
+    rest, remarks = _compare_prims(verifier.tree, reading.answer)
     return f"{line}; {rest}", remarks
 
 
@@ -127,9 +127,10 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
-      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION_ROUNDINGS` is this factor 18.
-    - Origin: three rounding errors (`_ORIGIN_ROUNDINGS`): of the scale factor, of the scaled origin, and of the
-      transformed origin.
+      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION_ROUNDINGS` is this factor
+      18.
+    - Origin: three rounding errors (`_ORIGIN_ROUNDINGS`): of the scale factor, of the scaled origin, and of
+      the transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -229,7 +230,10 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
             off = share * (abs(rule.multiplier) * largest_value(leader.limit) + abs(rule.offset))
             position_error, angle = (position_error + off, angle) if slides else (position_error, angle + off)
         parent_position_error, parent_angle_error = link_errors[joint.parent]
-        link_errors[i + 1] = parent_position_error + position_error + (parent_angle_error + angle) * length, parent_angle_error + angle
+        link_errors[i + 1] = (
+            parent_position_error + position_error + (parent_angle_error + angle) * length,
+            parent_angle_error + angle,
+        )
     return SinglePrecisionErrors(link_errors, joint_errors)
 
 
@@ -254,7 +258,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=STILL_STATE)[0]
     # The root's pose in the stage is arbitrary, so all poses become relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])

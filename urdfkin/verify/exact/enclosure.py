@@ -24,8 +24,8 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, frozen
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.numbers import ends, enough_digits, precision, read_exact
-from urdfkin.verify.exact.recursion import move, on_base
+from urdfkin.verify.exact.numbers import enough_digits, interval_ends, precision, read_exact_joints
+from urdfkin.verify.exact.recursion import compute_motion, make_base_state
 from urdfkin.verify.quantities import (
     ACCELERATION,
     HESSIAN,
@@ -35,12 +35,12 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import Verifier, oracle_results, own_results
+from urdfkin.verify.verifier import Verifier, compute_own_results, oracle_results
 
 #: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
 MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
-_ENDS = np.vectorize(ends, otypes=[float, float])
+_ENDS = np.vectorize(interval_ends, otypes=[float, float])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -71,7 +71,7 @@ class Enclosure:
         x = self._check_shape(x)
         return (self.lower <= x) & (x <= self.upper)
 
-    def error(self, x: ArrayLike) -> FloatArray:
+    def error_bound(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
         x = self._check_shape(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
@@ -146,22 +146,22 @@ def enclose(
         )
     for x, name in zip(inputs, "qva", strict=True):
         checked(tree, x, name)
-    link, part = call.links[0], call.part(slice(0, 1))
+    link, part = call.links[0], call.select(slice(0, 1))
     path = tree.path(link)
     digits = digits or enough_digits(len(path))
     with precision(digits):
-        motion = move(
+        motion = compute_motion(
             tree,
-            read_exact(verifier.text, tree, path),
+            read_exact_joints(verifier.text, tree, path),
             *(batch[0] for batch in part.query.inputs),
-            base=None if base is None else on_base(base),
+            base=None if base is None else make_base_state(base),
         )
         rows = (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE, *([HESSIAN] if hessian else []))
-        bounds = [(row, *_ENDS(row.truth(motion, link, call.reference))) for row in rows]
-    oracle = None if verifier.cannot(base) else verifier.oracle(base)
+        bounds = [(row, *_ENDS(row.enclose(motion, link, call.reference))) for row in rows]
+    oracle = None if verifier.find_refusal(base) else verifier.oracle(base)
 
     def make_enclosure(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
-        ours = frozen(own_results(row, part)[0, 0])
+        ours = frozen(compute_own_results(row, part)[0, 0])
         theirs = None if oracle is None else frozen(oracle_results(row, oracle, part.query)[0, 0])
         return Enclosure(row.name, frozen(lower), frozen(upper), ours, theirs)
 

@@ -20,10 +20,10 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.verify.exact.numbers import (
     ExactJoint,
-    about,
-    exact,
-    from_quaternion,
+    as_interval,
     nearest_rotation,
+    rotation_about,
+    rotation_from_quaternion,
 )
 from urdfkin.verify.oracle import BaseNumbers
 
@@ -37,14 +37,14 @@ _FREE_AXES = {
 }
 
 
-def on_base(base: BaseNumbers) -> State:
+def make_base_state(base: BaseNumbers) -> State:
     """Return the base's motion as the position, velocity and acceleration of the root link.
 
     The base's rotation matrix is replaced by the nearest rotation.
     """
 
     def vector(x: FloatArray) -> Vector:
-        return exact(x[0]), exact(x[1]), exact(x[2])
+        return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
     T, six, six_2 = base.placement, base.velocity, base.acceleration
     R = nearest_rotation((vector(T[0]), vector(T[1]), vector(T[2])))
@@ -60,7 +60,7 @@ class ExactMotion:
     nv: int
 
 
-def move(
+def compute_motion(
     tree: KinematicTree,
     joints: Mapping[int, ExactJoint],
     q: Iterable[Number],
@@ -71,10 +71,10 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    `joints` is a result of `read_exact`. The order is from the root outwards: a joint comes after its parent
-    joint.
+    `joints` is a result of `read_exact_joints`. The order is from the root outwards: a joint comes after its
+    parent joint.
     """
-    q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
+    q, v, a = (list(map(as_interval, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, exact_joint in joints.items():
@@ -87,17 +87,17 @@ def move(
             rates = multiplier * v[rate_at], multiplier * a[rate_at]
             z = _RECURSION.seen(placed, axis)
             if kind.turns:
-                moved = _RECURSION.revolute(placed, axis, about(axis, coordinate), *rates)
+                moved = _RECURSION.revolute(placed, axis, rotation_about(axis, coordinate), *rates)
             else:
                 moved = _RECURSION.prismatic(placed, axis, coordinate, *rates)
             new = (Column(z, kind.turns, moved, i, rate_at, multiplier),)
         elif kind is JointKind.FIXED:
             moved = placed
         elif kind is JointKind.PLANAR:
-            S = about(IDENTITY[2], q[at + 2])
+            S = rotation_about(IDENTITY[2], q[at + 2])
             moved = _RECURSION.planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
         elif kind is JointKind.FLOATING:
-            S = from_quaternion(q[at + 3 : at + 7])
+            S = rotation_from_quaternion(q[at + 3 : at + 7])
             moved = _RECURSION.floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
         else:
             raise NotImplementedError(f"the motion of a {kind} joint")
