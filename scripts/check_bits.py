@@ -37,7 +37,7 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
-from urdfkin.verify.verifier import bound_of
+from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches: less than one block of eight, exactly one block, and one or many blocks plus a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
@@ -77,7 +77,7 @@ class Subject:
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
         for quantity in recursive_quantities():
-            for reference in Reference if quantity.referred else (Reference.LOCAL_WORLD_ALIGNED,):
+            for reference in Reference if quantity.has_reference else (Reference.LOCAL_WORLD_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
                 yield what, quantity, reference, self.inputs[: len(quantity.inputs)]
 
@@ -89,7 +89,7 @@ class Subject:
         inputs: Sequence[Any],
         threads: int | None = None,
     ) -> FloatArray:
-        words = (frame, reference) if quantity.referred else (frame,)
+        words = (frame, reference) if quantity.has_reference else (frame,)
         how = {} if threads is None else {"threads": threads}
         result: FloatArray = getattr(self.robot, quantity.method)(*inputs, *words, verify=False, **how)
         return result
@@ -144,7 +144,7 @@ def to_keep(subject: Subject) -> dict[str, Any]:
         parts = [subject.computed(quantity, reference, frame, few) for frame in subject.frames]
         stored[what] = results = np.stack(parts, axis=1)
         call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
-        bound = bound_of(quantity, call.part(slice(0, KEPT)))
+        bound = compute_bound(quantity, call.select(slice(0, KEPT)))
         limit = np.broadcast_to(EPS * bound.k * bound.scale, results.shape)
         stored[f"{what}/bound"] = limit.astype(np.float32)
     return stored

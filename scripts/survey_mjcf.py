@@ -23,7 +23,7 @@ def said_of(path: Path) -> str:
     certificate = robot.certificate()
     if not certificate.verified:
         return "not verified"
-    shapes, _, said = certificate.reading.partition("Pinocchio's MJCF reader")
+    shapes, _, said = certificate.source_notes.partition("Pinocchio's MJCF reader")
     whole = ", without its shapes" if "does not compile" in shapes else ""
     for words in ("agrees on the bodies", "disagrees", "does not accept", "other joints", "no such body"):
         if words in said:

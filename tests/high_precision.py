@@ -16,7 +16,7 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.recursion import LinkState
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import numbers
-from urdfkin.verify.exact.recursion import ExactMotion, move
+from urdfkin.verify.exact.recursion import ExactMotion, compute_motion
 
 #: Number of digits of all computations with `mp`.
 mp = mpmath.mp.clone()
@@ -88,8 +88,11 @@ def angular_acceleration(R: Callable[[Any], Matrix], t: float) -> Matrix:
 def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None = None) -> ExactMotion:
     """Return the motion of one sample by the same recursion with mpmath's numbers instead of intervals."""
     with patch.object(numbers, "arb", mp.mpf):
-        joints, on = numbers.read_exact(robot.urdf, robot.tree), None if base is None else root_state(base)
-        return move(robot.tree, joints, *x, base=on)
+        joints, on = (
+            numbers.read_exact_joints(robot.urdf, robot.tree),
+            None if base is None else root_state(base),
+        )
+        return compute_motion(robot.tree, joints, *x, base=on)
 
 
 def root_state(base: BaseMotion) -> LinkState:

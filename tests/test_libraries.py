@@ -10,7 +10,7 @@ import pytest
 import urdfkin
 from scripts import make_libraries as maker
 from tests.urdf_standard import poses
-from urdfkin.verify.adapters import LIBRARIES, answer, version
+from urdfkin.verify.adapters import LIBRARIES, evaluate_case, version
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
@@ -54,7 +54,7 @@ def test_the_cells_of_an_installed_library_can_be_measured_again(library: str) -
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     for name, feature in FEATURES.items():
         case = {"text": feature.text, "configurations": maker.configurations(robots[name])}
-        found = maker.cell(feature, robots[name], library, answer(library, case))
+        found = maker.cell(feature, robots[name], library, evaluate_case(library, case))
         assert found["verdict"] == FIGURES["cells"][library][name]["verdict"], name
 
 

@@ -17,7 +17,7 @@ from tests.urdfs import joint, limit, mimic
 from urdfkin.cli.explain import answers, find_answer, format_answer
 from urdfkin.errors import QuestionsSection, UrdfkinError
 from urdfkin.urdf import xacro
-from urdfkin.verify.pinocchio import _wrong_module
+from urdfkin.verify.pinocchio import _make_wrong_module_error
 
 WHEEL = urdfs.robot(
     joint("axle", "continuous", "a", "b"),
@@ -102,7 +102,7 @@ ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
     QuestionsSection.UNKNOWN_FRAMES: [_raised(lambda: _ur5().placement(np.zeros(6), "tol0"))],
     QuestionsSection.ROW_ORDER: [_raised(lambda: urdfkin.BaseMotion(velocity=np.zeros(3)))],
     QuestionsSection.FIXED_JOINTS: [_raised(lambda: _ur5().placement("neutral, ee_fixed_joint=1"))],
-    QuestionsSection.WRONG_PINOCCHIO: [_raised(lambda: _raise(_wrong_module(np)))],
+    QuestionsSection.WRONG_PINOCCHIO: [_raised(lambda: _raise(_make_wrong_module_error(np)))],
     QuestionsSection.AXES: [_typed("explain", "axis-not-unit")],
     QuestionsSection.XACRO: [_raised(_without_xacrodoc), _typed("explain", "unexpanded-xacro")],
     QuestionsSection.GRAVITY: [_typed("acceleration", "--help"), _typed("imu", "--help")],

@@ -158,7 +158,7 @@ def test_a_disagreement_with_a_nan_ratio_is_raised_too(monkeypatch: pytest.Monke
     for results in ([wrong], [wrong, right], [right, wrong]):
         found = iter(results)
         monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))
-        monkeypatch.setattr(verifier, "_MOST", 1)
+        monkeypatch.setattr(verifier, "_MAX_CONFIGURATIONS", 1)
         with pytest.raises(urdfkin.VerificationError):
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 

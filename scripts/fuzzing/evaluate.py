@@ -105,7 +105,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
     for finding in findings:
         if finding.pinocchio_reading is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)
-    if (reason := robot.verifier.cannot()) is not None:
+    if (reason := robot.verifier.find_refusal()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)
     return Outcome("not verified, and no finding states the reason", texts)

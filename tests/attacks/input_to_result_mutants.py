@@ -169,7 +169,7 @@ def blind() -> list[str]:
             compute(robot)
         except Exception:
             continue
-        if not robot.verifier.cannot() and robot.certificate().verified:
+        if not robot.verifier.find_refusal() and robot.certificate().verified:
             found.append(name)
     return found
 
@@ -194,7 +194,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
             words.add(f"refused: {name}: {type(error).__name__}: {error}"[:200])
             continue
         if right is not None and not _alike(found[name], right[name]):
-            if robot.verifier.cannot() or not (robot.certificate().verified or name in UNCOUNTED):
+            if robot.verifier.find_refusal() or not (robot.certificate().verified or name in UNCOUNTED):
                 words.add("caught")  # the result is returned as not verified
             else:
                 wrong.append(name)

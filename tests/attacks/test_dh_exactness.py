@@ -54,7 +54,7 @@ def robot_of(tree: KinematicTree) -> urdfkin.Robot:
 
 
 def checked(robot: urdfkin.Robot, table: DHTable) -> TableCheck:
-    return present(robot.verifier.table(table))
+    return present(robot.verifier.check_table(table))
 
 
 def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millimetres() -> None:
@@ -65,7 +65,7 @@ def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millime
         check = checked(robot, table)
     longest = max(max(abs(row.a), abs(row.d)) for row in table.rows)
     assert longest > 1e11
-    assert not check.within
+    assert not check.is_within_bounds
     assert check.agrees
     predicted = f"which rounds by {EPS * longest * 1e3:.2g} mm"
     assert predicted in str(check)
@@ -86,7 +86,7 @@ def test_a_wrong_strict_table_with_very_long_rows_is_a_disagreement() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
     table = make_dh_table(robot.tree, "tip", "l0", near_parallel="strict")
     with pytest.raises(TableError, match="DISAGREES"):
-        robot.verifier.table(with_cells(table, 0, alpha=table.rows[0].alpha + 1e-3))
+        robot.verifier.check_table(with_cells(table, 0, alpha=table.rows[0].alpha + 1e-3))
 
 
 def rack(multiplier: float) -> str:
@@ -108,7 +108,7 @@ def test_a_correct_table_of_a_rack_and_pinion_agrees_for_every_multiplier(
 ) -> None:
     found = urdfkin.load(rack(multiplier))
     for convention in ("standard", "modified"):
-        assert checked(found, found.dh(*ends, convention)).within
+        assert checked(found, found.dh(*ends, convention)).is_within_bounds
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
@@ -117,7 +117,7 @@ def test_a_wrong_multiplier_in_a_table_is_detected(multiplier: float) -> None:
     table = found.dh("d", "a")
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
     with pytest.raises(TableError, match="DISAGREES"):
-        found.verifier.table(with_cells(table, 1, mimic=wrong))
+        found.verifier.check_table(with_cells(table, 1, mimic=wrong))
 
 
 # -- noise ----------------------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ def plain_table(near_parallel: str, *steps: FloatArray) -> DHTable:
     table = robot.dh("tip", "l0", near_parallel=near_parallel)
     assert not table.has_hayati_rows
     assert max(max(abs(row.a), abs(row.d)) for row in table.rows) < 2.0
-    assert checked(robot, table).within
+    assert checked(robot, table).is_within_bounds
     return table
 
 
@@ -165,7 +165,7 @@ def test_a_tilt_larger_than_rounding_gives_hayati_rows(tilt: float) -> None:
 def test_the_strict_table_of_so101_is_short_and_baxter_gets_a_hint_to_snap() -> None:
     robot = urdfkin.load("so101")
     table = robot.dh(near_parallel="strict")
-    assert checked(robot, table).within
+    assert checked(robot, table).is_within_bounds
     assert max(abs(row.d) for row in table.rows) < 1.0
     hint = next(line for line in good("dh baxter").text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint

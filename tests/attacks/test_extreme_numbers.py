@@ -25,8 +25,8 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import accuracy_study
-from urdfkin.verify.bounds import magnitudes
-from urdfkin.verify.exact.numbers import precision, read_exact
+from urdfkin.verify.bounds import compute_magnitudes
+from urdfkin.verify.exact.numbers import precision, read_exact_joints
 from urdfkin.verify.quantities import VELOCITY
 
 #: A robot with joints of each kind and two mimic joints.
@@ -115,7 +115,7 @@ def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size
     robot.velocity(q[0], v[0], "b")
     assert robot.certificate().verified
     plan = robot.plan([1])
-    sizes = magnitudes(plan, q, v, None, FIXED_BASE_STATE)
+    sizes = compute_magnitudes(plan, q, v, None, FIXED_BASE_STATE)
     bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
     allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
     assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)
@@ -138,7 +138,9 @@ def test_products_and_magnitudes_are_zero_only_if_a_factor_is_zero() -> None:
     robot = urdfkin.load("panda")
     q = robot.neutral()
     robot.velocity(q, np.zeros(robot.nv), "panda_hand")
-    size = magnitudes(robot.plan([5]), q[np.newaxis], np.zeros((1, robot.nv)), None, np.zeros((1, 24)))
+    size = compute_magnitudes(
+        robot.plan([5]), q[np.newaxis], np.zeros((1, robot.nv)), None, np.zeros((1, 24))
+    )
     assert not size.vel.any()
     assert not size.w.any()
     assert "velocity" in [line.quantity for line in robot.certificate().lines]
@@ -328,7 +330,7 @@ def test_quaternions_in_files_of_urdf_1_0_are_ignored(version: str) -> None:
 def test_the_decimals_of_a_quaternion_are_read_exactly() -> None:
     robot = urdfkin.load(turned_chain(['quat_xyzw="0 0 0.6 0.8"'], 'version="1.1"'))
     with precision(50):
-        R = read_exact(robot.urdf, robot.tree)[0].R
+        R = read_exact_joints(robot.urdf, robot.tree)[0].R
         assert abs(25 * R[0][0] - 7) < 1e-48
         assert abs(25 * R[1][0] - 24) < 1e-48
 
@@ -353,7 +355,7 @@ def test_the_breakdown_on_a_distant_base_uses_a_small_share_of_the_bound(
     robot.acceleration_breakdown(q, v, a, "panda_hand", reference, base=base)
     (line,) = robot.certificate().lines
     assert (line.quantity, line.checked) == ("acceleration breakdown", 60)
-    assert line.share < 0.05
+    assert line.share_of_bound < 0.05
 
 
 @pytest.mark.parametrize("root_joint", ["floating", "planar"])
@@ -364,7 +366,7 @@ def test_the_breakdown_after_a_distant_root_joint_uses_a_small_share_of_the_boun
     q[:, :2] += [5e5, 4.5e6]
     for reference in REFERENCES:
         robot.acceleration_breakdown(q, v, a, "panda_hand", reference)
-    assert robot.certificate().lines[0].share < 0.05
+    assert robot.certificate().lines[0].share_of_bound < 0.05
 
 
 @pytest.mark.parametrize("reference", ["local", "local_world_aligned"])

@@ -17,8 +17,8 @@ from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, pose
-from urdfkin.verify.bounds import magnitudes
-from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
+from urdfkin.verify.bounds import compute_magnitudes
+from urdfkin.verify.oracle import free_flyer, free_flyer_velocity, nearest_quaternion
 
 ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', "0.6 0 0.8"))
 
@@ -81,7 +81,7 @@ def test_a_base_keeps_its_numbers_and_a_floating_joint_has_velocities_in_its_own
     generator = np.random.default_rng(4)
     R, six = orientations(50, 3), generator.normal(size=(50, 6))
     expected = np.einsum("nji,npj->npi", nearest_rotation(R), six.reshape(50, 2, 3)).reshape(50, 6)
-    np.testing.assert_allclose(free_flyer_rates(BaseMotion(at(R), six)), expected, atol=1e-14)
+    np.testing.assert_allclose(free_flyer_velocity(BaseMotion(at(R), six)), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("frame", ["a", "b"])
@@ -108,14 +108,14 @@ def test_errors_on_a_rotated_base_are_well_within_the_bound(reference: str) -> N
     arm.jacobian(q, ["a", "b"], reference, base=base)
     arm.acceleration(q, v, a, ["a", "b"], reference, base=base)
     assert arm.certificate().verified
-    assert max(line.share for line in arm.certificate().lines) < 0.2
+    assert max(line.share_of_bound for line in arm.certificate().lines) < 0.2
 
 
 def test_only_a_rotated_base_counts_as_a_joint_in_the_bound() -> None:
     plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
-        (magnitudes(plan, q, None, None, state).roundings / PINOCCHIO_ROUNDINGS).tolist()
+        (compute_magnitudes(plan, q, None, None, state).roundings / PINOCCHIO_ROUNDINGS).tolist()
         for state in (FIXED_BASE_STATE, BaseMotion(pose(p=[1.0, 2.0, 3.0])).state(()), turned.state(()))
     ]
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]

@@ -14,11 +14,11 @@ from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import FloatArray, JointKind, inverse
 from urdfkin.robot.loading import load
-from urdfkin.verify.exact.numbers import ExactJoint, about, exact, precision, read_exact
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.numbers import ExactJoint, as_interval, precision, read_exact_joints, rotation_about
+from urdfkin.verify.exact.recursion import compute_motion
 
 #: Step of the difference quotients: its square is below the precision of a double, and thirty digits remain.
-STEP = exact(2.0**-66)
+STEP = as_interval(2.0**-66)
 Pose = tuple[Matrix, Vector]
 
 
@@ -29,7 +29,7 @@ def fifty_digits() -> Iterator[None]:
 
 
 def vector(x: FloatArray) -> Vector:
-    return exact(x[0]), exact(x[1]), exact(x[2])
+    return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
 
 def matrix(R: FloatArray) -> Matrix:
@@ -47,7 +47,7 @@ def back(T: Pose) -> Pose:
 
 def elementary(turns: bool, axis: int, value: Number) -> Pose:
     if turns:
-        return about(IDENTITY[axis], value), ZERO
+        return rotation_about(IDENTITY[axis], value), ZERO
     x, y, z = eq.times(value, IDENTITY[axis])
     return IDENTITY, (x, y, z)
 
@@ -84,7 +84,7 @@ def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fift
     robot = load(BRANCHED, verify=False)
     model = make_urdf_model(robot.tree, tip, base, ("base", "tool", "origins", "gains"))
     q = robot.sample(1, 3)[0]
-    joints = read_exact(robot.urdf, robot.tree)
+    joints = read_exact_joints(robot.urdf, robot.tree)
     numbers = {(p.element, p.name): k for k, p in enumerate(model.chain.parameters)}
 
     def moved_joint(name: str, own: ExactJoint, moved: dict[int, Number]) -> ExactJoint:
@@ -98,7 +98,7 @@ def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fift
     def place(moved: dict[int, Number]) -> Pose:
         names = [robot.tree.joints[i].name for i in joints]
         changed = {i: moved_joint(n, own, moved) for (i, own), n in zip(joints.items(), names, strict=True)}
-        states = move(robot.tree, changed, q, [0] * robot.nv, [0] * robot.nv).states
+        states = compute_motion(robot.tree, changed, q, [0] * robot.nv, [0] * robot.nv).states
         ends = [states[robot.tree.frame_link(name)] for name in (base, tip)]
         way = joined(back((ends[0].R, ends[0].p)), (ends[1].R, ends[1].p))
         return joined(joined(six(model, "base", moved), way), six(model, "tool", moved))
@@ -136,11 +136,11 @@ def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fif
 
     def place(moved: dict[int, Number]) -> Pose:
         def at(where: str, what: str, value: float) -> Number:
-            return exact(value) + moved.get(numbers.get((where, what), -1), 0)
+            return as_interval(value) + moved.get(numbers.get((where, what), -1), 0)
 
         T = joined(six(model, "base", moved), (matrix(dh.base[:3, :3]), vector(dh.base[:3, 3])))
         for i, row in enumerate(dh.rows):
-            value = row.sense * exact(q[0, i]) * (1 + moved.get(numbers[row.joint, "gain"], 0))
+            value = row.sense * as_interval(q[0, i]) * (1 + moved.get(numbers[row.joint, "gain"], 0))
             theta, d = at(row.joint, "theta", row.theta), at(row.joint, "d", row.d)
             theta, d = (theta + value, d) if row.kind.turns else (theta, d + value)
             S = joined(elementary(True, 2, theta), elementary(False, 2, d))

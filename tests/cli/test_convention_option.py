@@ -11,9 +11,9 @@ import urdfkin
 from tests.cli.running import good, numbers, python, refused
 from tests.cli.running import urdfkin as run
 from urdfkin.model.conventions import BUILT_IN
-from urdfkin.verify.quantities import by_command
+from urdfkin.verify.quantities import quantities_by_command
 
-OF_FRAMES = [name for name, row in by_command().items() if row.referred]
+OF_FRAMES = [name for name, row in quantities_by_command().items() if row.has_reference]
 DOG = ("a1", "--root-joint", "floating", "--frame", "FL_foot", "--convention")
 
 
@@ -22,7 +22,7 @@ DOG = ("a1", "--root-joint", "floating", "--frame", "FL_foot", "--convention")
 def test_a_result_equals_the_result_of_the_robot_in_the_convention(command: str, name: str) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     other = robot.with_convention(name)
-    row, rng = by_command()[command], np.random.default_rng(3)
+    row, rng = quantities_by_command()[command], np.random.default_rng(3)
     ours = robot.sample(1, 3)[0], rng.standard_normal(robot.nv), rng.standard_normal(robot.nv)
     values = dict(zip("qva", other.conversion.to(*ours), strict=True))
     given = [word for letter in row.inputs for word in (f"--{letter}={numbers(values[letter])}",)]

@@ -15,13 +15,13 @@ from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.quantities import by_command
+from urdfkin.verify.quantities import quantities_by_command
 
 #: Arrays t, q, v and a
 Motion = dict[str, FloatArray]
 N = 9  # the forward recursion computes eight configurations at a time
 COMMANDS = {
-    **{name: [row.inputs] for name, row in by_command().items()},
+    **{name: [row.inputs] for name, row in quantities_by_command().items()},
     "analytical-jacobian": ["q", "--representation", "quaternion"],
     "singular-values": ["q", "--rows", "linear"],
     "imu": ["qva"],

@@ -18,9 +18,9 @@ from urdfkin.dh.parse_table import published_tables
 from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify.quantities import by_command
+from urdfkin.verify.quantities import quantities_by_command
 
-QUANTITIES = {name: row.inputs for name, row in by_command().items()}
+QUANTITIES = {name: row.inputs for name, row in quantities_by_command().items()}
 Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
 
 

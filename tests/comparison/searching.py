@@ -12,8 +12,8 @@ from urdfkin.comparison.result import Interval
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.numbers import DIGITS, precision, read_exact
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.numbers import DIGITS, precision, read_exact_joints
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import PLACEMENT
 
 
@@ -21,8 +21,8 @@ def placed(robot: Robot, q: FloatArray, frame: str) -> list[Any]:
     """Return a frame's position at fifty digits, from the decimals of the text."""
     tree, link = robot.tree, robot.tree.link_index(frame)
     zeros = [0.0] * tree.nv
-    motion = move(tree, read_exact(robot.urdf, tree, tree.path(link)), q, zeros, zeros)
-    T = PLACEMENT.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
+    motion = compute_motion(tree, read_exact_joints(robot.urdf, tree, tree.path(link)), q, zeros, zeros)
+    T = PLACEMENT.enclose(motion, link, Reference.LOCAL_WORLD_ALIGNED)
     return [T[i][3] for i in range(3)]
 
 

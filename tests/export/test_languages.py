@@ -32,7 +32,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import precision
 from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.verifier import bound_of
+from urdfkin.verify.verifier import compute_bound
 
 RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
@@ -62,7 +62,7 @@ def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None
     vector, link = code(robot, quantities=_THREE).proof.vectors[0], robot.tree.frame_link(robot.tip_frame)
     motion = true_motion(robot, [np.array(x) for x in vector.inputs])
     for name, digits in vector.results.items():
-        true = QUANTITIES[name.replace("_", " ")].truth(motion, link, Reference.LOCAL_WORLD_ALIGNED)
+        true = QUANTITIES[name.replace("_", " ")].enclose(motion, link, Reference.LOCAL_WORLD_ALIGNED)
         for text, value in zip(digits, true.ravel(), strict=True):
             assert abs(mp.mpf(text) - value) <= max(abs(value) * mp.mpf(10) ** -49, mp.mpf(10) ** -58)
 
@@ -456,7 +456,7 @@ def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: 
     own = module(robot, "array", tmp_path, "jacobian")
     q, _, _ = state(robot, 5, 2)
     call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, (q,))
-    bound = bound_of(QUANTITIES["hessian"], call.part(slice(0, 5)))
+    bound = compute_bound(QUANTITIES["hessian"], call.select(slice(0, 5)))
     within = (EPS * bound.k * bound.scale)[:, 0]
     right = robot.hessian(q, robot.tip_frame)
     for slopes in (jax.jacfwd, jax.jacrev):

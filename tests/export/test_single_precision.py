@@ -23,7 +23,7 @@ from urdfkin.export.function import Function, single_bounds
 from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.exact.numbers import conversion
+from urdfkin.verify.exact.numbers import conversion_errors
 from urdfkin.verify.quantities import JACOBIAN
 
 _N = 4000
@@ -217,9 +217,9 @@ def test_the_bounds_of_a_file_include_the_conversion_errors_of_large_angles_and_
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") <= 1.0
     held = robot.with_locked_joints({"j": 0.7})
     assert shares_of(held, ("placement",), tmp_path, "c") <= 1.0
-    right = conversion
+    right = conversion_errors
     monkeypatch.setattr(
-        proof, "conversion", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTOR_COUNT))
+        proof, "conversion_errors", lambda *of: right(*of)._replace(angles=np.zeros(proof.VECTOR_COUNT))
     )
     assert shares_of(robot, ("placement", "jacobian"), tmp_path, "c") > 1.0
     assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
@@ -237,11 +237,11 @@ def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
     before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
-    right = conversion
+    right = conversion_errors
     for one in (robot, robot.with_locked_joints({"j": 0.7})):
         with monkeypatch.context() as patch:
             assert shares_of(one, ("placement",), tmp_path, "c") <= 1.0
-            patch.setattr(proof, "conversion", lambda *of: right(*of)._replace(lengths=np.zeros(1)))
+            patch.setattr(proof, "conversion_errors", lambda *of: right(*of)._replace(lengths=np.zeros(1)))
             assert shares_of(one, ("placement",), tmp_path, "c") > 1.0
 
 

@@ -21,7 +21,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.configuration import draw_samples
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.bounds import compute_magnitudes
 
 #: Every equation of motion, except those that compute a rotation from a sine and a cosine.
 EQUATIONS = sorted(
@@ -103,7 +103,7 @@ def test_the_motion_of_any_link_of_any_tree_is_within_the_computed_magnitude(
     plan = compile_tree(tree, range(len(tree.links)))
     samples = draw_samples(tree, 5, np.random.default_rng(seed), with_special=True)
     q, v, a = samples.q, speed * samples.v, speed * samples.a
-    size = magnitudes(plan, q, v, a, FIXED_BASE_STATE)
+    size = compute_magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     vel, acc = velocities(plan, q, v), accelerations(plan, q, v, a)
 
     def exceeds(found: FloatArray, size: FloatArray) -> bool:

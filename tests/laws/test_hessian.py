@@ -17,10 +17,16 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
-from urdfkin.verify.exact.numbers import about, exact, from_quaternion, precision, read_exact
+from urdfkin.verify.exact.numbers import (
+    as_interval,
+    precision,
+    read_exact_joints,
+    rotation_about,
+    rotation_from_quaternion,
+)
 from urdfkin.verify.quantities import HESSIAN, JACOBIAN
 
-_STEP = exact(2.0**-60)
+_STEP = as_interval(2.0**-60)
 #: Tolerance of the difference quotients; their error is proportional to the square of the step, 2^-120.
 #: Rounding loses only 18 of 80 digits.
 _ROOM = 1e-30
@@ -28,19 +34,19 @@ _Z = (0, 0, 1)
 
 
 def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
-    out: list[Any] = [exact(x) for x in q]
+    out: list[Any] = [as_interval(x) for x in q]
     tree = robot.tree
     for joint, at, rate_at in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
         if joint.mimic is not None or not rate_at <= rate < rate_at + joint.kind.nv:
             continue
         unit = [step if c == rate - rate_at else 0.0 for c in range(joint.kind.nv)]
         if joint.kind is JointKind.PLANAR:
-            x, y, _ = eq.rotate(about(_Z, out[at + 2]), (unit[0], unit[1], 0))
+            x, y, _ = eq.rotate(rotation_about(_Z, out[at + 2]), (unit[0], unit[1], 0))
             out[at : at + 3] = [out[at] + x, out[at + 1] + y, out[at + 2] + unit[2]]
         elif joint.kind is JointKind.FLOATING:
             quaternion = tuple(out[at + 3 : at + 7])
             x, y, z, w = quaternion
-            slide = eq.rotate(from_quaternion(quaternion), tuple(unit[:3]))
+            slide = eq.rotate(rotation_from_quaternion(quaternion), tuple(unit[:3]))
             half = tuple(part / 2 for part in unit[3:])
             turn = eq.plus(eq.times(w, half), eq.cross((x, y, z), half))
             moved = [*eq.plus(tuple(out[at : at + 3]), slide), *eq.plus((x, y, z), turn)]
@@ -60,12 +66,14 @@ def test_the_hessian_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
     q, link, still = state(robot, 1, 3)[0][0], robot.tree.frame_link(robot.tip_frame), [0.0] * robot.nv
 
     def jacobian(rate: int, step: Any) -> NDArray[Any]:
-        motion = recursion.move(robot.tree, joints, stepped(robot, q, rate, step), still, still)
-        return JACOBIAN.truth(motion, link, reference)
+        motion = recursion.compute_motion(robot.tree, joints, stepped(robot, q, rate, step), still, still)
+        return JACOBIAN.enclose(motion, link, reference)
 
     with precision(80):
-        joints = read_exact(robot.urdf, robot.tree, robot.tree.path(link))
-        found = HESSIAN.truth(recursion.move(robot.tree, joints, list(q), still, still), link, reference)
+        joints = read_exact_joints(robot.urdf, robot.tree, robot.tree.path(link))
+        found = HESSIAN.enclose(
+            recursion.compute_motion(robot.tree, joints, list(q), still, still), link, reference
+        )
         for j in range(robot.nv):
             quotient = (jacobian(j, _STEP) - jacobian(j, -_STEP)) / (2 * _STEP)
             assert (abs(found[..., j] - quotient) < _ROOM).all()
@@ -127,10 +135,10 @@ def test_the_placement_of_the_base_rotates_the_hessian() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(4)
     T = pose([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [1.0, 2.0, 3.0])
-    on_base = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
+    make_base_state = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
     turned = np.kron(np.eye(2), T[:3, :3])
     expected = np.einsum("rs,nsij->nrij", turned, robot.hessian(q, "panda_hand"))
-    np.testing.assert_allclose(on_base, expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(make_base_state, expected, rtol=0, atol=1e-14)
 
 
 def test_an_error_of_1e_12_in_the_hessian_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

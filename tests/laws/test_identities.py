@@ -19,7 +19,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 LOCAL, WORLD, ALIGNED = Reference
@@ -204,7 +204,7 @@ def test_the_acceleration_is_the_sum_of_the_terms_of_the_jacobian_and_of_the_jac
     generator = np.random.default_rng(5)
     q, (v, a) = robot.sample(4, 5), generator.normal(size=(2, 4, tree.nv))
     plan = robot.plan(range(len(tree.links)))
-    size = magnitudes(plan, q, v, a, FIXED_BASE_STATE)
+    size = compute_magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     for reference in Reference:
         J, J_rate = evaluate.jacobians(plan, q, reference), evaluate.jacobian_rates(plan, q, v, reference)
         total = np.einsum("nfij,nj->nfi", J, a) + np.einsum("nfij,nj->nfi", J_rate, v)

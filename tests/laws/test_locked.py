@@ -28,7 +28,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import recursive_quantities
@@ -75,7 +75,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
     whole, part = (q[None], v, a), (q[None, of_q], v[:, of_v], a[:, of_v])
     frames = robot.link_frames
     plan = robot.plan([robot.tree.frame_link(frame) for frame in frames])
-    size = magnitudes(plan, *whole, FIXED_BASE_STATE)
+    size = compute_magnitudes(plan, *whole, FIXED_BASE_STATE)
     for row in recursive_quantities():
         for reference in row.references:
             inputs = [x[: len(row.inputs)] for x in (whole, part)]
@@ -84,7 +84,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
             ours = locked.compute(row.name, inputs[1], frames, named)
             bound = row.bound(plan, size, reference)
             most = np.broadcast_to(EPS * bound.k * bound.scale, full.shape)
-            for axis in range(full.ndim)[3:] if row.columns else ():
+            for axis in range(full.ndim)[3:] if row.has_columns else ():
                 full, most = full.take(of_v, axis), most.take(of_v, axis)
             assert ours.shape == full.shape, row.name
             assert (np.abs(ours - full) <= most).all(), (row.name, reference)
@@ -111,7 +111,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: OracleLibrary
         locked.acceleration(q, v, a, locked.link_frames, reference, verify=True)
         locked.jacobian_rate(q, v, locked.link_frames, reference, verify=True)
     assert locked.certificate().verified
-    assert all(line.share > 0.0 or not locked.nv for line in locked.certificate().lines)
+    assert all(line.share_of_bound > 0.0 or not locked.nv for line in locked.certificate().lines)
 
 
 @pytest.mark.parametrize("name", ["panda", "a1"])
@@ -135,7 +135,7 @@ def test_any_tree_with_locked_joints_equals_the_complete_tree_at_the_locked_valu
     names = [name for name in lockable(robot) if data.draw(st.booleans())]
     q = robot.sample(1, seed=data.draw(st.integers(0, 99)))[0]
     locked = demand_the_columns(robot, names, q, np.random.default_rng(5))
-    if robot.verifier.unverifiable is None:
+    if robot.verifier.known_refusal is None:
         locked.placement(locked.sample(2), locked.link_frames, verify=True)
         locked.jacobian(locked.sample(2), locked.link_frames, verify=True)
 
@@ -280,8 +280,8 @@ def test_all_other_results_exist_for_a_locked_robot() -> None:
     assert "--lock panda_joint3=0.3 --lock panda_finger_joint1=0.04" in str(report.as_dict()["command"])
     assert panda.view(q) is not None
     one = np.ones(panda.nv)
-    assert (panda.enclose(q, one, one, frame).jacobian.error(panda.jacobian(q, frame)) < 1e-14).all()
-    assert panda.certificate().reading == "panda_joint3 locked at 0.3, panda_finger_joint1 at 0.04"
+    assert (panda.enclose(q, one, one, frame).jacobian.error_bound(panda.jacobian(q, frame)) < 1e-14).all()
+    assert panda.certificate().source_notes == "panda_joint3 locked at 0.3, panda_finger_joint1 at 0.04"
 
 
 MJCF = """<mujoco><worldbody><body name="b"><joint name="one" axis="0 0 1"/><geom size="1"/>
@@ -300,7 +300,7 @@ def test_a_robot_from_another_format_can_be_locked(source: str) -> None:
     T = whole.placement([0.25, 1.0], tip)
     assert np.abs(locked.placement([1.0], tip) - T).max() < 1e-15
     assert locked.certificate().verified
-    assert locked.verifier.reading == whole.verifier.reading
+    assert locked.verifier.source_notes == whole.verifier.source_notes
 
 
 def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text() -> None:

@@ -26,15 +26,17 @@ from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
 from urdfkin.robot.trajectory import _central_velocities
-from urdfkin.verify.bounds import magnitudes, movable
+from urdfkin.verify.bounds import compute_magnitudes, find_active_entries
 from urdfkin.verify.exact.numbers import ExactJoint
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 
 REFUSED = (AttributeError, KeyError, AssertionError, NotImplementedError)
-REFERRED = [row for row in QUANTITIES.values() if row.referred and row.recursive and row.of != "columns"]
+REFERRED = [
+    row for row in QUANTITIES.values() if row.has_reference and row.recursive and row.object_kind != "columns"
+]
 
 
 def new_reference(**properties: bool) -> Reference:
@@ -76,7 +78,7 @@ def test_a_reference_frame_without_axes_and_point_cannot_be_defined() -> None:
 @pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
 def test_the_recursion_refuses_a_new_reference_frame(plan: Any, reference: Reference, row: Quantity) -> None:
     with pytest.raises(REFUSED):
-        row.ours(plan, (X, X, X), reference)
+        row.compute_results(plan, (X, X, X), reference)
 
 
 @pytest.mark.parametrize("name", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
@@ -102,15 +104,15 @@ def test_exported_code_refuses_a_new_reference_frame(plan: CompiledTree, name: s
 def test_bounds_refuse_a_reference_frame_without_properties(plan: CompiledTree, row: Quantity) -> None:
     if row.name.split()[-1] == "jacobian":
         with pytest.raises(REFUSED):
-            movable(plan, NEW["bare"])
+            find_active_entries(plan, NEW["bare"])
         return  # the size of a Jacobian's terms is the same in each reference frame
     with pytest.raises(REFUSED):
-        row.bound(plan, magnitudes(plan, X, X, X, FIXED_BASE_STATE), NEW["bare"])
+        row.bound(plan, compute_magnitudes(plan, X, X, X, FIXED_BASE_STATE), NEW["bare"])
 
 
 def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(plan: Any, reference: Reference) -> None:
     with pytest.raises(REFUSED):
-        QUANTITIES["hessian"].bound(plan, magnitudes(plan, X, X, X, FIXED_BASE_STATE), reference)
+        QUANTITIES["hessian"].bound(plan, compute_magnitudes(plan, X, X, X, FIXED_BASE_STATE), reference)
 
 
 @pytest.mark.parametrize("oracle", ORACLES)
@@ -122,11 +124,11 @@ def test_the_oracles_refuse_a_new_reference_frame(
         pytest.importorskip("mujoco")
         if row.name == "hessian":
             return
-    model = ORACLES[oracle].oracle(robot.urdf, robot.tree)
-    joints = row.of == "joints"
+    model = ORACLES[oracle].make_oracle(robot.urdf, robot.tree)
+    joints = row.object_kind == "joints"
     frame = f"joint:{robot.joint_names[0]}" if joints else robot.tip_frame
     with pytest.raises(REFUSED):
-        row.ask(model, QueryBatch([frame], (X, X, X), reference, joints=joints))
+        row.ask_oracle(model, QueryBatch([frame], (X, X, X), reference, frames_are_joints=joints))
 
 
 def test_kernels_and_command_line_support_every_reference_frame() -> None:
@@ -157,7 +159,7 @@ def plan_of_last(robot: urdfkin.Robot) -> CompiledTree:
 METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
     "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
-    "size of terms": lambda robot, x: magnitudes(plan_of_last(robot), x, x, x, FIXED_BASE_STATE),
+    "size of terms": lambda robot, x: compute_magnitudes(plan_of_last(robot), x, x, x, FIXED_BASE_STATE),
     "pose": lambda robot, x: pose_of(robot.tree.joints[0].kind, x),
     "coordinates": lambda robot, _: coordinates_of(robot.tree.joints[0].kind, np.eye(4)),
     "sample": lambda robot, _: robot.sample(1),
@@ -165,7 +167,9 @@ METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "convention": lambda robot, _: robot.convention("mujoco"),
     "export": lambda robot, _: make_function(plan_of_last(robot), QUANTITIES["velocity"], Reference.WORLD),
     "same": lambda robot, _: urdfkin.same(robot, robot),
-    "digits": lambda robot, x: move(robot.tree, {0: ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)}, x, x, x),
+    "digits": lambda robot, x: compute_motion(
+        robot.tree, {0: ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)}, x, x, x
+    ),
     "velocities": lambda robot, x: _central_velocities(robot.tree, np.stack((x, x, x)), np.arange(3.0)),
     "integrate": lambda robot, x: robot.integrate(x, x),
     "difference": lambda robot, x: robot.difference(x, x),

@@ -30,7 +30,7 @@ def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long
     for leaf in robot.tree.leaves():
         tip = robot.tree.links[leaf]
         table = make_dh_table(robot.tree, tip, root, convention)
-        check = present(robot.verifier.table(table, samples=10))
+        check = present(robot.verifier.check_table(table, samples=10))
         assert check.agrees
         assert max(check.units.values()) <= 20.0 + sum_zeroed_tilts(robot.chain(tip, root)) / EPS
         reach = float(robot.chain(tip, root).lengths.sum())

@@ -68,10 +68,10 @@ Write = Callable[..., Path]
 def patch(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Read MJCF in this process, so that a test can replace functions."""
 
-    def ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-        return json.loads(json.dumps(list(mjcf_process.answers(request)))), "ended"
+    def ask(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
+        return json.loads(json.dumps(list(mjcf_process.compute_answers(request)))), "ended"
 
-    monkeypatch.setattr(mjcf_check, "_ask", ask)
+    monkeypatch.setattr(mjcf_check, "_ask_process", ask)
     return monkeypatch
 
 
@@ -155,7 +155,7 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(wri
     robot.placement(robot.sample(3), robot.link_frames)
     certificate = robot.certificate()
     assert certificate.verified
-    assert "MuJoCo" in certificate.reading
+    assert "MuJoCo" in certificate.source_notes
     assert "Pinocchio's MJCF reader" in str(certificate)
     rule = next(present(joint.mimic) for joint in robot.tree.joints if joint.name == "f")
     assert (rule.mimicked_joint, rule.multiplier) == ("pitch", 2.0)
@@ -289,7 +289,7 @@ def test_a_free_body_that_mujoco_aligns_has_mujocos_placements_and_velocities(te
     assert T[:3, 3] == pytest.approx(data.site("camera").xpos, abs=1e-14)
     assert T[:3, :3].ravel() == pytest.approx(data.site("camera").xmat, abs=1e-14)
     assert robot.velocity(q, v, "camera") == pytest.approx(np.roll(theirs, 3), abs=1e-13)
-    assert "does not compile" not in robot.certificate().reading
+    assert "does not compile" not in robot.certificate().source_notes
     np.testing.assert_array_equal(loaded(text, verify=False).placement(q, "camera"), T)
 
 
@@ -301,7 +301,7 @@ def test_a_body_that_cannot_be_aligned_is_reported_and_the_certificate_states_th
         robot = urdfkin.load(text)
     robot.placement(robot.neutral(), "camera")
     words = "MuJoCo compiles the file only without shapes and inertias: Error: Error opening"
-    assert words in robot.certificate().reading
+    assert words in robot.certificate().source_notes
 
 
 def test_a_fused_static_body_stays_a_link_and_is_refused_if_its_parent_is_aligned() -> None:
@@ -341,14 +341,14 @@ def test_a_chain_of_equalities_becomes_mimic_rules_that_agree_with_mujoco() -> N
     robot.placement(robot.sample(3), "c")
     certificate = robot.certificate()
     assert certificate.verified
-    assert "and 2 mimic rules agree" in certificate.reading
+    assert "and 2 mimic rules agree" in certificate.source_notes
 
 
 def test_an_inactive_equality_is_no_mimic_rule() -> None:
     idle = '<joint name="idle" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="false"/>'
     robot = loaded(coupled(idle))
     assert robot.coordinate_names == ("a", "b", "c")
-    assert "mimic rules" not in robot.certificate().reading
+    assert "mimic rules" not in robot.certificate().source_notes
 
 
 def wrong_offset(right: Callable[..., Any]) -> Callable[..., Any]:
@@ -454,7 +454,7 @@ def test_the_compilation_of_a_file_with_endless_replicas_ends_with_an_error() ->
         inside = f'<replicate count="1000" offset="1 0 0">{inside}</replicate>'
     began = time.monotonic()
     with pytest.raises(InputError, match="cannot compile this MJCF: found MuJoCo did not finish within 3 s"):
-        mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", patience=3.0)
+        mjcf_check.read_mjcf(f"<mujoco><worldbody>{inside}</worldbody></mujoco>", timeout=3.0)
     assert time.monotonic() - began < 20.0
 
 
@@ -472,7 +472,7 @@ def test_a_file_that_asks_for_too_much_memory_is_refused(more: str) -> None:
 
 def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None:
     robot = loaded(free_body(more='<size njmax="80000" nconmax="40000" nstack="1000000000"/>'))
-    assert "does not compile" not in robot.verifier.reading
+    assert "does not compile" not in robot.verifier.source_notes
 
 
 def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -483,7 +483,7 @@ def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch:
 
     monkeypatch.setattr(mjcf_check, "run_python", first_only)
     robot = loaded(free_body(joint='align="true"'))
-    assert "shapes and inertias: MuJoCo did not finish within 60 s" in robot.verifier.reading
+    assert "shapes and inertias: MuJoCo did not finish within 60 s" in robot.verifier.source_notes
     assert "MJCF101" in {finding.code for finding in robot.findings}
     monkeypatch.setattr(mjcf_check, "run_python", lambda *arguments: (b'{"urdf": "half', -11))
     words = "<text>: MuJoCo cannot compile this MJCF: found MuJoCo's process ended"

@@ -161,7 +161,7 @@ def test_a_model_without_bodies_is_compared_by_its_joints_if_memory_allows(joint
         model.addJoint(k, pin.JointModelRX(), pin.SE3.Random(), f"turn_{k}")
     made = loaded(model)
     assert made.link_names == ("universe", *(f"turn_{k}_link" for k in range(joints)))
-    assert words in made.verifier.reading
+    assert words in made.verifier.source_notes
 
 
 def test_an_axis_of_a_yourdfpy_robot_that_is_no_unit_vector_is_a_warning() -> None:
@@ -178,7 +178,7 @@ def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_
         path = write(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'), "r.urdf")
         robot = urdfkin.load(yourdfpys(str(path)))
         robot.placement([0.0], "b")
-        texts[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
+        texts[rotation] = [str(f) for f in robot.findings], robot.certificate().source_notes
     assert texts['rpy="0 0 1"'] == ([], "")
     assert texts['xyz="1 2 3"'] == texts['quat_xyzw="0 0 1 0"']
     (finding,), reading = texts['quat_xyzw="0 0 1 0"']
@@ -281,7 +281,7 @@ def test_joints_of_a_pinocchio_model_without_an_equivalent_are_refused() -> None
 def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
     number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = conversions._placements
+    right = conversions._model_placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
@@ -289,7 +289,7 @@ def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
         T[:, -1, *number] += 3e-13
         return T
 
-    monkeypatch.setattr(conversions, "_placements", moved)
+    monkeypatch.setattr(conversions, "_model_placements", moved)
     with pytest.raises(OracleError, match=r"made from a pinocchio.Model differs from the model"):
         urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
 

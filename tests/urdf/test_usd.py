@@ -142,7 +142,7 @@ def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks
     assert re.search(
         r"OpenUSD [\d.]+: UsdPhysics and urdfkin read the same 2 joints \(.*\); "
         r"UsdGeom's transforms of 3 prims agree at q = 0",
-        certificate.reading or "",
+        certificate.source_notes or "",
     )
 
 
@@ -307,7 +307,7 @@ def test_the_joint_to_the_world_may_be_the_articulation_root_as_in_isaac_sim(rea
     robot = read(LINKS.replace(ROOT, "") + JOINTS + mount)
     assert robot.link_names[0] == "world"
     robot.placement([0.0, 0.0], "lower")
-    assert "the same 3 joints" in str(robot.certificate().reading)
+    assert "the same 3 joints" in str(robot.certificate().source_notes)
 
 
 def test_two_trees_below_one_articulation_root_are_chosen_by_their_root_bodies(write: Write) -> None:
@@ -331,7 +331,7 @@ def test_a_prim_with_another_pose_than_its_joints_give_is_reported(read: Read) -
     robot = read((ARM).replace("localPos0 = (0, 0, 1)", "localPos0 = (0, 0, 1.001)"))
     (finding,) = findings(robot)
     assert re.match(r"USD304 /arm/upper: .*\b0\.001 m", finding)
-    assert "differently" in str(robot.certificate().reading)
+    assert "differently" in str(robot.certificate().source_notes)
 
 
 def renamed(text: str) -> str:
@@ -366,7 +366,7 @@ def test_robots_with_the_same_joint_names_may_be_shown_in_different_configuratio
     assert set(robot.joint_names) == {"shoulder", "rail", "shoulder_", "rail_"}
     assert codes(robot) == {}
     robot.placement(robot.neutral(), "arm_lower")
-    assert "with 1 joint not at zero" in str(robot.certificate().reading)
+    assert "with 1 joint not at zero" in str(robot.certificate().source_notes)
 
 
 def variants() -> str:
@@ -726,7 +726,7 @@ def test_two_to_the_power_of_40_prims_are_an_error_in_limited_time(write: Write)
     path = write(stage(ARM) + prims)
     begin = time.monotonic()
     with pytest.raises(InputError, match=r"cannot read this stage.*(does not|did not finish|memory)"):
-        usd_check.read_usd(path, patience=4.0)
+        usd_check.read_usd(path, timeout=4.0)
     assert time.monotonic() - begin < 30.0
 
 
@@ -753,10 +753,10 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     refs = "".join(f'def "x{k}" (references = @./part{k}.usda@</a>) {{ }}\n' for k in range(5))
     path = write(stage(ARM + refs))
     own = path.stat().st_size
-    monkeypatch.setattr(usd, "MOST", own + 2000)
+    monkeypatch.setattr(usd, "MAX_BYTES", own + 2000)
     with pytest.raises(SourceError, match=f"too large: found over {own + 2000} bytes"):
         usd.find_layer_files(usd.import_openusd(), str(path))
-    monkeypatch.setattr(usd, "MOST", own + 5000)
+    monkeypatch.setattr(usd, "MAX_BYTES", own + 5000)
     assert len(usd.find_layer_files(usd.import_openusd(), str(path))) == 6
 
 
@@ -857,7 +857,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     from urdfkin.verify import usd_process
 
     def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
-        return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0
+        return json.dumps(usd_process.read_stage(json.loads(request))).encode() + b"\n", 0
 
     monkeypatch.setattr(usd_check, "run_python", ask)
     return loaded(path)
@@ -1506,6 +1506,6 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
             kind = op.rstrip("XYZ")
             worst[kind] = max(worst[kind], angle / SINGLE_ROUNDOFF)
     # The error of an angle above 256 degrees is at most 2^-16 degrees; the errors of several angles add.
-    assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
+    assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM_ROUNDINGS
     assert 1.0 < worst["Orient"] <= 4.0
     assert 0.5 < worst["Transform"] <= math.sqrt(1.5)

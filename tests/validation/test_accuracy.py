@@ -28,7 +28,7 @@ from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, Errors, accuracy_study, exact_quaternion
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
-from urdfkin.verify.exact.numbers import exact, precision, read_exact
+from urdfkin.verify.exact.numbers import as_interval, precision, read_exact_joints
 from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -65,7 +65,7 @@ def slightly_larger(monkeypatch: pytest.MonkeyPatch, name: str, units: float) ->
 
 def test_decimals_are_read_exactly_and_a_wrong_number_of_bases_is_refused() -> None:
     robot = urdfkin.load("planar_two_link")
-    joints = read_exact(robot.urdf, robot.tree)
+    joints = read_exact_joints(robot.urdf, robot.tree)
     assert abs(5 * joints[2].p[0] - 2) < 1e-78
     assert not joints[2].p[0].contains(0.4)
     with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
@@ -80,7 +80,9 @@ def test_exact_velocity_and_acceleration_of_the_elbow_are_derivatives_to_many_di
         text = text.replace(f" {word}", f" {independent.nstr(independent.mpf(float(word)), 60)}")
         text = text.replace(f'"{word}', f'"{independent.nstr(independent.mpf(float(word)), 60)}')
     tree = urdfkin.load("elbow").tree
-    motion_of = exact_recursion.move(tree, read_exact(text, tree), moving.q, moving.v, moving.a)
+    motion_of = exact_recursion.compute_motion(
+        tree, read_exact_joints(text, tree), moving.q, moving.v, moving.a
+    )
     state = motion_of.states[tree.link_index("wrist")]
     # The independent computation differentiates with a step of 1e-18 at 60 digits.
     for found, derivative, room in (
@@ -96,11 +98,11 @@ def test_the_exact_jacobian_rate_is_the_difference_quotient_of_the_jacobian() ->
     moving = motion("polar", 13)
     step = 2.0**-50
     robot = urdfkin.load("polar")
-    joints, link = read_exact(robot.urdf, robot.tree), robot.tree.link_index("slider")
+    joints, link = read_exact_joints(robot.urdf, robot.tree), robot.tree.link_index("slider")
 
     def at(t: float) -> exact_recursion.ExactMotion:
-        q = [exact(x) + t * exact(rate) for x, rate in zip(moving.q, moving.v, strict=True)]
-        return exact_recursion.move(robot.tree, joints, q, moving.v, moving.v)
+        q = [as_interval(x) + t * as_interval(rate) for x, rate in zip(moving.q, moving.v, strict=True)]
+        return exact_recursion.compute_motion(robot.tree, joints, q, moving.v, moving.v)
 
     for reference in Reference:
         ahead, behind = (exact_recursion.jacobian_values(at(t), link, reference).T for t in (step, -step))
@@ -166,24 +168,26 @@ def test_a_moving_base_equals_a_floating_joint_with_the_same_motion() -> None:
     q = robot.sample(1, 4)[0]
     v, a = generator.standard_normal((2, robot.nv))
     T, six, six_2 = base.placement[0], base.velocity[0], base.acceleration[0]
-    root = exact_recursion.on_base(BaseRows(T, six, six_2))
+    root = exact_recursion.make_base_state(BaseRows(T, six, six_2))
     back = eq.transposed(root.R)
     u, o = eq.rotate(back, root.vel), eq.rotate(back, root.w)
     u_rate = eq.rotate(back, eq.minus(root.acc, eq.cross(root.w, root.vel)))
     o_rate = eq.rotate(back, root.alpha)
     quaternion = exact_quaternion(np.array([root.R], dtype=object), quaternion_of(T[:3, :3])[np.newaxis])[0]
-    on_base = exact_recursion.move(robot.tree, read_exact(robot.urdf, robot.tree), q, v, a, base=root)
+    on_base = exact_recursion.compute_motion(
+        robot.tree, read_exact_joints(robot.urdf, robot.tree), q, v, a, base=root
+    )
     free = ([*root.p, *quaternion], [*u, *o], [*u_rate, *o_rate])
     full = ([*first, *rest] for first, rest in zip(free, (q, v, a), strict=True))
-    afloat = exact_recursion.move(hung.tree, read_exact(hung.urdf, hung.tree), *full)
+    afloat = exact_recursion.compute_motion(hung.tree, read_exact_joints(hung.urdf, hung.tree), *full)
     for link, name in enumerate(robot.tree.links):
         there = hung.tree.link_index(name)
         for reference in Reference:
             for quantity in ("placement", "velocity", "acceleration"):
-                one = QUANTITIES[quantity].truth(on_base, link, reference)
-                other = QUANTITIES[quantity].truth(afloat, there, reference)
+                one = QUANTITIES[quantity].enclose(on_base, link, reference)
+                other = QUANTITIES[quantity].enclose(afloat, there, reference)
                 assert (abs(one - other) < 1e-40).all(), (name, quantity, reference)
-            rate = QUANTITIES["jacobian rate"].truth
+            rate = QUANTITIES["jacobian rate"].enclose
             one, other = rate(on_base, link, reference), rate(afloat, there, reference)
             assert (abs(one - other[:, 6:]) < 1e-40).all(), (name, reference)
 
@@ -230,12 +234,12 @@ def angles(name: str, R: object) -> list[object]:
 @pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
 def test_the_exact_analytical_jacobian_is_the_difference_quotient_of_the_pose(name: str) -> None:
     robot = urdfkin.load("panda")
-    joints, link = read_exact(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
+    joints, link = read_exact_joints(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
     q, zeros, step = robot.sample(1, 5)[0], [0] * robot.nv, 2.0**-60
 
     def at(column: int, off: float) -> exact_recursion.ExactMotion:
-        numbers = [exact(x) + (off if i == column else 0) for i, x in enumerate(q)]
-        return exact_recursion.move(robot.tree, joints, numbers, zeros, zeros)
+        numbers = [as_interval(x) + (off if i == column else 0) for i, x in enumerate(q)]
+        return exact_recursion.compute_motion(robot.tree, joints, numbers, zeros, zeros)
 
     def pose(column: int, off: float) -> list[object]:
         state = at(column, off).states[link]
@@ -246,7 +250,7 @@ def test_the_exact_analytical_jacobian_is_the_difference_quotient_of_the_pose(na
     here = at(0, 0)
     R = np.array(here.states[link].R, dtype=object)
     near = quaternion_of(R.astype(float))[np.newaxis]
-    J_v = QUANTITIES["jacobian"].truth(here, link, Reference.LOCAL_WORLD_ALIGNED)
+    J_v = QUANTITIES["jacobian"].enclose(here, link, Reference.LOCAL_WORLD_ALIGNED)
     if name == "quaternion":
         J = quaternion_jacobian(exact_quaternion(R[np.newaxis], near), J_v[np.newaxis])[0]
     else:

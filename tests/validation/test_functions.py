@@ -335,7 +335,7 @@ def test_a_function_for_the_centre_of_mass_in_the_axes_of_the_body_is_checked(qu
 
 def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> None:
     arm = urdfkin.load("planar_two_link")
-    arm.verifier.unverifiable = "a reason"
+    arm.verifier.known_refusal = "a reason"
     found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
     assert found.oracle_bound_ratio is None
     assert "NOT checked" in str(found)

@@ -16,7 +16,7 @@ from urdfkin.verify import pinocchio, verifier
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
-from urdfkin.verify.verifier import SAMPLE, Verify, parts
+from urdfkin.verify.verifier import SAMPLE, Verify, split_into_parts
 
 #: Numbers of values in a part: of one configuration, of a few, and of all.
 SIZES = (1, 200, 10**9)
@@ -105,7 +105,7 @@ def test_the_error_names_the_worst_sample_in_any_part_of_the_batch(
         q[(*other, 7)] = MARK
         q[(*worst, 7)] = MARK + 1e-4
         for size in SIZES:
-            monkeypatch.setattr(verifier, "_PART_SIZE", size)
+            monkeypatch.setattr(verifier, "_MAX_VALUES", size)
             for quantity, compute in calls(fresh, q, v, a, motion, True).items():
                 with pytest.raises(urdfkin.VerificationError) as caught:
                     compute()
@@ -126,7 +126,7 @@ def test_the_certificate_does_not_depend_on_the_division_into_parts(
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
-        monkeypatch.setattr(verifier, "_PART_SIZE", size)
+        monkeypatch.setattr(verifier, "_MAX_VALUES", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, moving(base), True).values():
             compute()
@@ -171,7 +171,7 @@ def test_blocks_of_jacobians_of_a_robot_without_moving_joints_have_no_columns() 
 def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_unchecked(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
-    monkeypatch.setattr(verifier, "_PART_SIZE", size)
+    monkeypatch.setattr(verifier, "_MAX_VALUES", size)
     q, v, a = batch(fresh, (250,))
     for compute in calls(fresh, q, v, a, moving(base), "sample").values():
         compute()
@@ -180,7 +180,7 @@ def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_
         of = {"placement": 3, "acceleration": 3}.get(line.quantity, 1)
         assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
         assert line.worst > 0.0
-        assert 0.0 < line.share < 1.0
+        assert 0.0 < line.share_of_bound < 1.0
     assert len(certificate.lines) == 6
     assert not certificate.verified
     assert certificate.not_verified == ('verify="sample" checks 100 configurations of a call',)
@@ -199,7 +199,8 @@ def test_with_sample_a_small_batch_is_checked_completely(fresh: Robot, n: int) -
 @pytest.mark.parametrize("numbers", [1, 6, 48, 10**7])
 def test_the_checked_sample_is_deterministic_distinct_and_spread_over_the_batch(n: int, numbers: int) -> None:
     drawn, again = (
-        [i for part in parts("sample", n, numbers) for i in np.arange(n)[part].tolist()] for _ in range(2)
+        [i for part in split_into_parts("sample", n, numbers) for i in np.arange(n)[part].tolist()]
+        for _ in range(2)
     )
     assert drawn == again == sorted(drawn)
     assert len(set(drawn)) == SAMPLE
@@ -212,13 +213,13 @@ def test_the_checked_sample_is_deterministic_distinct_and_spread_over_the_batch(
 def test_the_parts_of_a_complete_check_contain_each_configuration_once(n: int, numbers: int) -> None:
     choices: tuple[Verify, ...] = (True, "sample") if n <= SAMPLE else (True,)
     for verify in choices:
-        indices = [i for part in parts(verify, n, numbers) for i in np.arange(n)[part].tolist()]
+        indices = [i for part in split_into_parts(verify, n, numbers) for i in np.arange(n)[part].tolist()]
         assert indices == list(range(n))
 
 
 @pytest.mark.usefixtures("lies")
 def test_an_error_in_the_checked_sample_is_detected_and_an_error_outside_is_not(fresh: Robot) -> None:
-    drawn = np.concatenate([np.arange(250)[part] for part in parts("sample", 250, 48)])
+    drawn = np.concatenate([np.arange(250)[part] for part in split_into_parts("sample", 250, 48)])
     inside, outside = int(drawn[57]), int(np.setdiff1d(np.arange(250), drawn)[3])
     q, v, a = batch(fresh, (250,))
     q[:, 7] = 0.0

@@ -16,7 +16,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify import bounds, derived
-from urdfkin.verify.bounds import Bound, Magnitudes, magnitudes
+from urdfkin.verify.bounds import Bound, Magnitudes, compute_magnitudes
 from urdfkin.verify.call import Call
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.quantities import (
@@ -95,10 +95,10 @@ def test_the_bound_of_an_imu_has_the_scale_with_gravity_and_the_factors_of_an_ac
     robot = urdfkin.load(ARM)
     inputs = np.array([[0.3, 0.5], [1.5, -2.0], [0.7, 0.2]])
     call = Call(robot.tree, robot.plan, "l3", LOCAL, None, list(inputs), gravity=[3.0, 0.0, 4.0])
-    part = call.part(slice(0, 1))
+    part = call.select(slice(0, 1))
     _, bound = derived.check_imu(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
     v, a = part.rates
-    size = magnitudes(part.plan, part.q, v, a, part.state)
+    size = compute_magnitudes(part.plan, part.q, v, a, part.state)
     linear = (size.acc + size.w * size.vel + 5.0).item()
     assert rows(bound) == (linear, size.w.item(), 24.0 * JOINTS * (ACCELERATION.factors + 1))
 
@@ -106,11 +106,11 @@ def test_the_bound_of_an_imu_has_the_scale_with_gravity_and_the_factors_of_an_ac
 def test_the_bound_of_a_relative_placement_includes_both_paths() -> None:
     robot = urdfkin.load(ARM)
     call = Call(robot.tree, robot.plan, "l3", ALIGNED, None, ([0.3, 0.5],), also=("l2",), relative_to="l2")
-    part = call.part(slice(0, 1))
+    part = call.select(slice(0, 1))
     _, bound = derived.check_relative_placement(
         PLACEMENT.bound, robot.verifier.oracle(), part, np.zeros((1, 1, 4, 4)), PINOCCHIO
     )
-    size = magnitudes(part.plan, part.q, None, None, part.state)
+    size = compute_magnitudes(part.plan, part.q, None, None, part.state)
     assert (bound.scale[0, 0, :3, 3] == size.p.sum()).all()
     assert (bound.scale[0, 0, :3, :3] == 1.0).all()
     assert bound.k.ravel().tolist() == [24.0 * (JOINTS + 2.0 * (JOINTS - 1.0))]
@@ -130,7 +130,7 @@ def test_columns_that_the_bound_treats_as_zero_are_zero_in_the_jacobian(
     frame: str, reference: Reference, linear: list[bool]
 ) -> None:
     robot = urdfkin.load(ARM)
-    found = bounds.movable(robot.plan([robot.tree.frame_link(frame)]), reference)
+    found = bounds.find_active_entries(robot.plan([robot.tree.frame_link(frame)]), reference)
     assert found.shape == (1, 6, 2)
     assert found[0, :3].tolist() == [linear] * 3
     assert found[0, 3:].tolist() == [[frame != "l0", False]] * 3
@@ -142,19 +142,19 @@ def test_columns_that_the_bound_treats_as_zero_are_zero_in_the_jacobian(
 def test_the_bound_of_euler_rates_grows_with_the_inverse_square_of_the_singularity_distance(
     plan: CompiledTree,
 ) -> None:
-    def euler(apart: float) -> FloatArray:
+    def euler(axis_sine: float) -> FloatArray:
         jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
-        return np.asarray(bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]])).scale[0, 0])
+        return np.asarray(bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[axis_sine]])).scale[0, 0])
 
     delta = EPS * 24.0 * JOINTS
-    for apart in (1.0, 1e-3, 1e-6):
-        scale, s = euler(apart), apart - delta
+    for axis_sine in (1.0, 1e-3, 1e-6):
+        scale, s = euler(axis_sine), axis_sine - delta
         assert (scale[:3] == [P, 3.0]).all()
         assert scale[[3, 5], 0] == pytest.approx(1.5 / s**2, rel=1e-15)
         assert scale[4, 0] == pytest.approx(1.0 / s, rel=1e-15)
         assert (scale[3:, 1] == 0.0).all()
     assert not np.isfinite(euler(delta)[3:, 0]).any()
-    assert bounds.nearest_singularity(plan) == 4.0 * delta
+    assert bounds.singularity_margin(plan) == 4.0 * delta
 
 
 def test_the_bound_of_quaternion_rates_is_the_bound_of_the_jacobian(plan: CompiledTree) -> None:
@@ -214,21 +214,21 @@ def test_no_result_exceeds_the_computed_magnitude(
     base = BaseMotion(velocity=rng.normal(size=6), acceleration=rng.normal(size=6)).state(())
     base = base if moving else FIXED_BASE_STATE
     plan = robot.plan(range(len(robot.link_names)))
-    size = magnitudes(plan, q, v, a, base)
+    size = compute_magnitudes(plan, q, v, a, base)
     vel, acc = velocities(plan, q, v, base=base), accelerations(plan, q, v, a, base=base)
     assert not exceed(placements(plan, q, base=base)[..., :3, 3], size.p)
     assert not exceed(vel[..., :3], size.vel)
     assert not exceed(vel[..., 3:], size.w)
     assert not exceed(acc[..., :3], size.acc)
     assert not exceed(acc[..., 3:], size.alpha)
-    places = magnitudes(plan, q, None, None, base)
+    places = compute_magnitudes(plan, q, None, None, base)
     assert (places.p == size.p).all()
     assert (places.roundings == size.roundings).all()
 
 
 def of_the_arm(q: list[float], v: list[float], a: list[float]) -> Magnitudes:
     robot = urdfkin.load(LONG_ARM)
-    return magnitudes(robot.plan([4]), np.array([q]), np.array([v]), np.array([a]), FIXED_BASE_STATE)
+    return compute_magnitudes(robot.plan([4]), np.array([q]), np.array([v]), np.array([a]), FIXED_BASE_STATE)
 
 
 def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:

@@ -16,7 +16,7 @@ import urdfkin
 from tests.laws.subjects import state
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.certificate import CHECK_TURNED_OFF, Certificate
+from urdfkin.verify.certificate import CHECK_DISABLED, Certificate
 from urdfkin.verify.comparison import BatchComparison
 
 FRAME = "panda_hand"
@@ -64,7 +64,7 @@ def test_the_certificate_counts_calls_of_every_kind(robot: Robot) -> None:
     assert counts(robot)["placement"] == (1 + 2, 3 + 1 + len(robot.link_names) + 7 + 5)
     robot.velocity(one[0], np.repeat(v, 4, axis=0), FRAME)
     assert counts(robot)["velocity"] == (0, 3 + 4)
-    assert robot.certificate().not_verified == (CHECK_TURNED_OFF,)
+    assert robot.certificate().not_verified == (CHECK_DISABLED,)
 
 
 def test_the_certificate_does_not_count_refused_calls(robot: Robot) -> None:
@@ -94,7 +94,7 @@ def test_unchecked_calls_of_a_prepared_frame_and_checked_calls_have_one_certific
     assert certificate.verified  # preparing returns no result
     assert certificate.oracle.startswith("Pinocchio 4.")
     assert 0.0 < certificate.lines[0].worst < 100.0
-    assert 0.0 < certificate.lines[0].share < 1.0
+    assert 0.0 < certificate.lines[0].share_of_bound < 1.0
     fast.jacobian(q[0])
     robot.velocity(q, q, FRAME)
     certificate = robot.certificate()
@@ -158,7 +158,7 @@ def test_a_certificate_states_the_file_name_and_the_digest_and_can_be_saved(tmp_
 
 @pytest.mark.parametrize("reading", ["", "MuJoCo 4.0.0 at 9 configurations"])
 def test_a_certificate_states_the_check_of_the_reader_if_there_was_a_check(reading: str) -> None:
-    certificate = Certificate("arm", "Pinocchio 4.1.0", (), (), reading=reading)
+    certificate = Certificate("arm", "Pinocchio 4.1.0", (), (), source_notes=reading)
     for text in (str(certificate), certificate._repr_markdown_(), certificate._repr_html_()):
         assert ("read: " in text.lower()) == bool(reading)
         assert reading in text
@@ -168,10 +168,10 @@ def test_a_certificate_states_the_check_of_the_reader_if_there_was_a_check(readi
 def test_a_fraction_of_the_bound_that_is_nan_is_preserved_in_a_sum_of_comparisons(other: float) -> None:
     wrong, right = BatchComparison(1, np.nan, np.nan, (3,)), BatchComparison(2, 1.0, other, (4,))
     for both in (wrong + right, right + wrong):
-        assert np.isnan(both.share)
+        assert np.isnan(both.share_of_bound)
         assert np.isnan(both.worst)
         assert not both.agrees
-        assert both.results == 3
+        assert both.result_count == 3
     assert (wrong + BatchComparison()).index == (BatchComparison() + wrong).index == (3,)
 
 

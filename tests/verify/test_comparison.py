@@ -11,7 +11,7 @@ from scripts.check_bits import WAYS
 from urdfkin.compiled.preload import ComputeMode, use_only
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.comparison import disagreement, worst_of_each
+from urdfkin.verify.comparison import disagreement, worst_disagreements
 
 ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST_NORMAL, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
 NEVER = (np.inf, -np.inf, np.nan)
@@ -58,7 +58,7 @@ def test_worst_of_each_equals_the_definition_to_the_last_bit(
     case: tuple[FloatArray, FloatArray, FloatArray, int],
 ) -> None:
     ours, theirs, scale, axes = case
-    found = worst_of_each(ours, theirs, scale, axes)
+    found = worst_disagreements(ours, theirs, scale, axes)
     with np.errstate(over="ignore"):
         expected = definition(ours, theirs, scale, axes)
     assert found.shape == ours.shape[:axes]
@@ -72,7 +72,9 @@ def test_worst_of_each_equals_the_definition_for_typical_results(seed: int) -> N
     ours = generator.standard_normal((33, 3, 6, 8))
     theirs = ours + EPS * generator.standard_normal(ours.shape)
     scale = generator.uniform(0.1, 9.0, (33, 3, 6, 8))
-    np.testing.assert_array_equal(worst_of_each(ours, theirs, scale, 2), definition(ours, theirs, scale, 2))
+    np.testing.assert_array_equal(
+        worst_disagreements(ours, theirs, scale, 2), definition(ours, theirs, scale, 2)
+    )
 
 
 @pytest.mark.parametrize("frames", [1, 3])
@@ -84,7 +86,7 @@ def test_worst_of_each_equals_the_definition_for_a_scale_common_to_three_rows(fr
     scale[..., 5:] = ours[..., 5:] = theirs[..., 5:] = 0.0
     ours[3, 0, 1, 6], ours[5, -1, 2, 0], theirs[7, 0, 4, 1] = 5e-324, np.nan, np.inf
     ours[9, 0, 5, 2], theirs[11, 0, 0, 7] = -np.inf, -np.nan
-    found = worst_of_each(ours, theirs, scale, 2)
+    found = worst_disagreements(ours, theirs, scale, 2)
     np.testing.assert_array_equal(found, definition(ours, theirs, scale, 2))
     assert np.argwhere(np.isinf(found)).tolist() == [[3, 0], [5, frames - 1], [7, 0], [9, 0], [11, 0]]
 
@@ -97,19 +99,19 @@ def test_a_value_that_is_not_finite_disagrees_at_every_place(place: int, bad: fl
     spoiled[3].flat[place] = bad
     expected = [0.0, 0.0, 0.0, np.inf, 0.0]
     for arrays in ((spoiled, right, right), (right, spoiled, right), (right, right, spoiled)):
-        assert worst_of_each(*arrays, 2)[:, 0].tolist() == expected
-    assert worst_of_each(spoiled, spoiled, right, 2)[:, 0].tolist() == expected
+        assert worst_disagreements(*arrays, 2)[:, 0].tolist() == expected
+    assert worst_disagreements(spoiled, spoiled, right, 2)[:, 0].tolist() == expected
 
 
 def test_with_the_scale_zero_only_equal_numbers_agree() -> None:
     ours = np.array([[0.0, 1.0], [0.0, 1.0], [-0.0, 1.0]])
     theirs = np.array([[0.0, 1.0], [5e-324, 1.0], [0.0, 1.0]])
-    assert worst_of_each(ours, theirs, np.array([0.0, 1.0]), 1).tolist() == [0.0, np.inf, 0.0]
+    assert worst_disagreements(ours, theirs, np.array([0.0, 1.0]), 1).tolist() == [0.0, np.inf, 0.0]
 
 
 @pytest.mark.parametrize(("shape", "axes"), [((0, 1, 4, 4), 2), ((3, 0, 6), 2), ((3, 2, 6, 0), 2), ((0,), 0)])
 def test_the_disagreement_of_empty_arrays_is_zero(shape: tuple[int, ...], axes: int) -> None:
     nothing = np.zeros(shape)
-    found = worst_of_each(nothing, nothing, nothing, axes)
+    found = worst_disagreements(nothing, nothing, nothing, axes)
     assert found.shape == shape[:axes]
     assert not found.any()

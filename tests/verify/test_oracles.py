@@ -29,7 +29,7 @@ from urdfkin.validation.document import ValidationVerdict
 from urdfkin.verify import oracles, second_reader
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import pinocchio, version
-from urdfkin.verify.second_reader import SecondReading, second_reading
+from urdfkin.verify.second_reader import SecondReading, compare_with_yourdfpy
 from urdfkin.verify.verifier import NotVerifiedWarning
 
 
@@ -254,7 +254,7 @@ ARM = urdfs.robot(
 def reading(text: str, **how: Any) -> SecondReading:
     robot = loaded(text, verify=False, **how)
     added = robot.root_joint is not None
-    return second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic, root_joint=added)
+    return compare_with_yourdfpy(robot.urdf, robot.tree, mimic=robot.verifier.mimic, root_joint=added)
 
 
 QUICK = ("panda", "talos", "elbow")
@@ -265,7 +265,7 @@ QUICK = ("panda", "talos", "elbow")
 )
 def test_both_urdf_readers_agree_on_every_robot_of_the_catalogue(name: str) -> None:
     robot = loaded(name, verify=False)
-    found = second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
+    found = compare_with_yourdfpy(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
     assert (found.differences, found.unread) == ((), None)
     assert found.joints == len(robot.tree.joints)
     assert name not in QUICK or not found.known
@@ -296,7 +296,7 @@ PLANTED: dict[str, tuple[str, Callable[[Any], Any], str]] = {
 
 def plant(monkeypatch: pytest.MonkeyPatch, what: str) -> str:
     """Let yourdfpy read a joint wrongly; return the difference to report."""
-    right, (attribute, change, words) = second_reader.read, PLANTED[what]
+    right, (attribute, change, words) = second_reader.read_with_yourdfpy, PLANTED[what]
 
     def wrong(text: str) -> Any:
         robot = right(text)
@@ -305,7 +305,7 @@ def plant(monkeypatch: pytest.MonkeyPatch, what: str) -> str:
         setattr(owner, name, change(getattr(owner, name)))
         return robot
 
-    monkeypatch.setattr(second_reader, "read", wrong)
+    monkeypatch.setattr(second_reader, "read_with_yourdfpy", wrong)
     return words
 
 
@@ -339,14 +339,14 @@ def test_known_faults_of_the_second_reader_are_listed_and_are_no_differences() -
 def test_a_file_that_yourdfpy_cannot_read_is_reported_and_is_no_failure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(second_reader, "read", Mock(side_effect=KeyError("link")))
+    monkeypatch.setattr(second_reader, "read_with_yourdfpy", Mock(side_effect=KeyError("link")))
     report = validate(ARM, samples=0)
     assert report.passed
     assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"  # type: ignore[index]
 
 
 def test_a_file_with_a_document_type_is_not_passed_to_yourdfpy() -> None:
-    found = second_reading("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
+    found = compare_with_yourdfpy("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
     assert found.unread == "the file has a document type declaration"
 
 
@@ -354,4 +354,4 @@ def test_the_declared_encoding_of_a_file_causes_no_difference_between_the_reader
     text = ARM.replace("turn", "drehen_ä")
     assert reading(text).differences == ()
     declared = '<?xml version="1.0" encoding="latin-1"?>' + text
-    assert second_reading(declared, loaded(text, verify=False).tree).differences == ()
+    assert compare_with_yourdfpy(declared, loaded(text, verify=False).tree).differences == ()

@@ -28,8 +28,14 @@ from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Magnitudes
-from urdfkin.verify.oracle import Oracle, QueryBatch, coupled
-from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, recursive_quantities
+from urdfkin.verify.oracle import Oracle, QueryBatch, couple_columns
+from urdfkin.verify.quantities import (
+    QUANTITIES,
+    VELOCITY,
+    Quantity,
+    quantities_by_command,
+    recursive_quantities,
+)
 
 # -- a new row: the angular velocity -------------------------------------------------------------------
 
@@ -51,9 +57,11 @@ def size(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> Fl
 
 
 TURNING = replace(
-    VELOCITY, name="angular velocity", title="angular velocity", shape=(3,), compute=turning, ask=pinocchios,
-    scale=size, head="turns", labels=("wx", "wy", "wz"), units={"angular": "rad/s"},
-    command="angular-velocity", summary="angular velocity of a frame", page="How fast it turns.",
+    VELOCITY, name="angular velocity", title="angular velocity", shape=(3,), compute=turning,
+    ask_oracle=pinocchios,
+    scale=size, heading="turns", labels=("wx", "wy", "wz"), units={"angular": "rad/s"},
+    command="angular-velocity", summary="angular velocity of a frame",
+    help_text="How fast it turns.",
     example="urdfkin angular-velocity ur5",
 )  # fmt: skip
 
@@ -75,7 +83,7 @@ def test_a_new_quantity_is_computed_checked_and_certified() -> None:
     np.testing.assert_array_equal(found, six[..., 3:])
     (line,) = (line for line in robot.certificate().lines if line.quantity == "angular velocity")
     assert (line.checked, line.unchecked) == (10, 0)
-    assert 0.0 < line.share < 1.0
+    assert 0.0 < line.share_of_bound < 1.0
 
 
 def test_an_error_of_a_new_quantity_is_detected_with_a_command_that_repeats_the_computation(
@@ -148,19 +156,19 @@ def test_the_equations_of_each_quantity_exist_in_the_equation_table(row: Quantit
 @pytest.mark.parametrize("row", recursive_quantities(), ids=lambda row: row.name)
 def test_a_robot_has_a_method_for_each_quantity_with_the_declared_inputs(row: Quantity) -> None:
     parameters = list(inspect.signature(getattr(Robot, row.method)).parameters)
-    takes = [*row.inputs, "frame", *(["reference"] if row.referred else [])]
+    takes = [*row.inputs, "frame", *(["reference"] if row.has_reference else [])]
     assert parameters == ["self", *takes, "base", "out", "verify", "threads"]
     robot = urdfkin.load("polar")
     inputs = [robot.sample(2)] * len(row.inputs)
     found = robot.compute(row.name, inputs, "slider")
     np.testing.assert_array_equal(found, getattr(robot, row.method)(*inputs, "slider"))
-    assert found.shape == (2, *row.own_shape(robot.nv))
+    assert found.shape == (2, *row.result_shape(robot.nv))
     assert robot.certificate().verified
 
 
 def test_the_quantities_with_a_command_are_those_listed_here() -> None:
     commands = "placement velocity jacobian jacobian-rate hessian acceleration"
-    assert list(by_command()) == commands.split()
+    assert list(quantities_by_command()) == commands.split()
 
 
 def test_an_unknown_quantity_or_wrong_inputs_are_refused() -> None:
@@ -192,21 +200,21 @@ def test_coupled_columns_are_the_product_with_g_to_the_last_bit(data: st.DataObj
             expected[..., index[column]] += J[..., column] * factor[column]
     for way in WAYS:
         with use_only(way):
-            np.testing.assert_array_equal(coupled(J, columns, index, factor, nv), expected)
+            np.testing.assert_array_equal(couple_columns(J, columns, index, factor, nv), expected)
 
 
 def test_coupled_columns_of_read_only_views_are_correct() -> None:
     J = np.arange(24.0).reshape(2, 3, 4).swapaxes(0, 1)
     J.setflags(write=False)
     places = np.array([0, 2], dtype=np.int64)
-    found = coupled(J, places, np.array([0, 0, 1, 1]), np.array([1.0, 1.0, -2.0, 1.0]), 2)
+    found = couple_columns(J, places, np.array([0, 0, 1, 1]), np.array([1.0, 1.0, -2.0, 1.0]), 2)
     np.testing.assert_array_equal(found, J[..., [0, 2]] * [1.0, -2.0])
 
 
 @pytest.mark.parametrize("rows", [0, 1])
 def test_coupled_columns_of_a_robot_without_joint_velocities_are_empty(rows: int) -> None:
     nothing = np.zeros(0, dtype=np.int64)
-    assert coupled(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
+    assert couple_columns(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
 
 
 # -- random samples of a validation --------------------------------------------------------------------

@@ -21,11 +21,11 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.configuration import draw_base_motion, draw_samples
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.call import Call
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import JACOBIAN, QUANTITIES
-from urdfkin.verify.verifier import bound_of
+from urdfkin.verify.verifier import compute_bound
 
 ARMS = ("panda", "ur5", "talos", "kinova", "tiago", "elbow", "planar_two_link")
 METHODS = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
@@ -38,7 +38,9 @@ def _compiled() -> Iterator[None]:
 
 
 def entries(robot: Robot) -> dict[str, tuple[int, float, float, int]]:
-    return {x.quantity: (x.checked, x.worst, x.share, x.unchecked) for x in robot.certificate().lines}
+    return {
+        x.quantity: (x.checked, x.worst, x.share_of_bound, x.unchecked) for x in robot.certificate().lines
+    }
 
 
 @pytest.mark.slow
@@ -75,7 +77,7 @@ def planted(robot: Robot, method: str, place: int, by: float) -> Any:
         result.flat[place] = x + (by if x <= 0.0 else -by) if by else np.nextafter(x, np.inf)
         return result
 
-    return robot.verifier.with_check(method, wrong, plan, frame, Reference.LOCAL_WORLD_ALIGNED)
+    return robot.verifier.make_checked_function(method, wrong, plan, frame, Reference.LOCAL_WORLD_ALIGNED)
 
 
 @pytest.mark.slow
@@ -87,7 +89,7 @@ def test_an_error_in_any_number_of_a_single_result_is_detected(name: str, method
     inputs = (q, v, a)[: METHODS[method]]
     quantity = QUANTITIES[method]
     call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, inputs)
-    bound, shape = bound_of(quantity, call.part(slice(0, 1))), quantity.own_shape(robot.nv)
+    bound, shape = compute_bound(quantity, call.select(slice(0, 1))), quantity.result_shape(robot.nv)
     bounds = np.broadcast_to(EPS * bound.k * bound.scale, (1, 1, *shape)).ravel()
     step = max(1, len(bounds) // 60)  # some entries of a Hessian
     for place in range(0, len(bounds), step):
@@ -160,11 +162,13 @@ def test_magnitudes_of_one_configuration_are_equal_alone_and_in_a_batch(subject:
     base = draw_base_motion(n, rng).state((n,)) if moving else FIXED_BASE_STATE
     plan = robot.plan(range(len(robot.link_names)))
     for v, a in ((None, None), (drawn.v, None), (drawn.v, drawn.a)):
-        every = magnitudes(plan, drawn.q, v, a, base)
+        every = compute_magnitudes(plan, drawn.q, v, a, base)
         for k in range(n):
             at = slice(k, k + 1)
             rates = (None if x is None else x[at] for x in (v, a))
-            one = magnitudes(plan, drawn.q[at], next(rates), next(rates), base[at] if moving else base)
+            one = compute_magnitudes(
+                plan, drawn.q[at], next(rates), next(rates), base[at] if moving else base
+            )
             for field in ("p", "roundings") if v is None else ("p", "w", "vel", "alpha", "acc", "roundings"):
                 assert getattr(one, field)[0].tobytes() == getattr(every, field)[k].tobytes(), field
 
@@ -178,11 +182,11 @@ def test_a_bound_that_is_computed_once_is_valid_for_every_configuration(name: st
     for frame in (robot.tip_frame, [*robot.link_names[-2:]]):
         for quantity in (QUANTITIES["placement"], JACOBIAN, QUANTITIES["hessian"]):
             for reference in Reference:
-                part = Call(robot.tree, robot.plan, frame, reference, base, (q,)).part(slice(0, 5))
-                size = magnitudes(part.plan, part.q, None, None, part.state)
+                part = Call(robot.tree, robot.plan, frame, reference, base, (q,)).select(slice(0, 5))
+                size = compute_magnitudes(part.plan, part.q, None, None, part.state)
                 expected = quantity.bound(part.plan, size, reference)
                 shape = expected.scale.shape
-                for found in (bound_of(quantity, part), bound_of(quantity, part)):
+                for found in (compute_bound(quantity, part), compute_bound(quantity, part)):
                     assert isinstance(found, Bound)
                     np.testing.assert_array_equal(np.broadcast_to(found.scale, shape), expected.scale)
                     np.testing.assert_array_equal(found.k + 0.0 * expected.k, expected.k)
@@ -194,7 +198,7 @@ def test_two_computations_of_a_jacobian_in_pinocchio_differ_by_less_than_half_th
     oracle: Oracle = robot.verifier.oracle()
     q, frame = robot.sample(20, 3), robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
-    size = magnitudes(plan, q, None, None, FIXED_BASE_STATE)
+    size = compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE)
     for reference in Reference:
         alone = oracle.jacobians(QueryBatch((frame,), (q,), reference))
         among = oracle.jacobians(QueryBatch((frame, robot.link_names[0]), (q,), reference))[:, :1]

@@ -19,11 +19,11 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.exact.numbers import precision, read_exact
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.numbers import precision, read_exact_joints
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import JACOBIAN
-from urdfkin.verify.singular_values import Between, SingularValues, _skew, singular_values
-from urdfkin.verify.singularity import FrameColumns, Singularity
+from urdfkin.verify.singular_values import BoundedArray, SingularValues, _orthogonality_error, singular_values
+from urdfkin.verify.singularity import FrameJacobian, Singularity
 
 exact = np.vectorize(mp.mpf, otypes=[object])
 ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
@@ -36,12 +36,14 @@ def true_values(A: np.ndarray) -> list[mpmath.mpf]:
 def true_jacobian(robot: Robot, q: FloatArray, frame: str) -> np.ndarray:
     link, still = robot.tree.frame_link(frame), [0.0] * robot.nv
     with precision(60):
-        motion = move(robot.tree, read_exact(robot.urdf, robot.tree, robot.tree.path(link)), q, still, still)
-        found: np.ndarray = exact(JACOBIAN.truth(motion, link, Reference.LOCAL_WORLD_ALIGNED))
+        motion = compute_motion(
+            robot.tree, read_exact_joints(robot.urdf, robot.tree, robot.tree.path(link)), q, still, still
+        )
+        found: np.ndarray = exact(JACOBIAN.enclose(motion, link, Reference.LOCAL_WORLD_ALIGNED))
         return found
 
 
-def holds(found: Between, true: list[mpmath.mpf]) -> bool:
+def holds(found: BoundedArray, true: list[mpmath.mpf]) -> bool:
     low, high = (np.atleast_1d(end).tolist() for end in (found.lower, found.upper))
     return all(mp.mpf(a) <= x <= mp.mpf(b) for a, x, b in zip(low, true, high, strict=True))
 
@@ -137,7 +139,7 @@ def test_the_bounds_of_a_product_hold_if_a_partial_product_overflows_or_underflo
     sizes: tuple[float, ...], product: mpmath.mpf
 ) -> None:
     values = np.array(sorted(sizes, reverse=True))
-    bounds = Between(values, values * (1.0 - 1e-15), values * (1.0 + 1e-15))
+    bounds = BoundedArray(values, values * (1.0 - 1e-15), values * (1.0 + 1e-15))
     found = SingularValues(slice(None), bounds, np.eye(len(sizes)), np.eye(len(sizes)))
     assert holds(found.manipulability, [product])
     assert holds(found.condition, [mp.mpf(values[0]) / mp.mpf(values[-1])])
@@ -207,7 +209,7 @@ def test_bounds_of_singular_values_include_underflow_of_products(monkeypatch: py
 
 def test_the_measure_of_orthogonality_includes_the_rounding_of_the_product() -> None:
     # Each number of the product of 3 by 3 matrices has the error bound 5 eps.
-    assert _skew(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
+    assert _orthogonality_error(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
 
 
 def test_bounds_of_singular_values_and_products_are_rounded_outward() -> None:
@@ -217,7 +219,7 @@ def test_bounds_of_singular_values_and_products_are_rounded_outward() -> None:
         off = singular_values(np.zeros((1, 3)), np.full((1, 3), x), np.ones(3, dtype=bool))
         assert mp.mpf(float(off.values.upper[0])) ** 2 >= 3 * mp.mpf(x) ** 2
         values = np.array([max(x, y), min(x, y)])
-        found = SingularValues(slice(None), Between(values, values, values), np.eye(2), np.eye(2))
+        found = SingularValues(slice(None), BoundedArray(values, values, values), np.eye(2), np.eye(2))
         one, other = map(mp.mpf, values)
         for between, true in ((found.manipulability, one * other), (found.condition, one / other)):
             assert mp.mpf(float(between.lower)) < true < mp.mpf(float(between.upper))
@@ -364,10 +366,10 @@ def test_lost_directions_and_null_motions_are_null_spaces_of_the_jacobian() -> N
     robot = urdfkin.load("ur5")
     for q in (np.zeros(6), np.array([0.3, -1, 0, 0.4, 0.5, 0.6]), np.array([0.3, -1, 1, 0.4, 0, 0.6])):
         one, J = found(robot, q), robot.jacobian(q, "tool0")
-        assert (one.rank, one.full, bool(one)) == (5, 6, True)
-        assert one.lost.shape == one.motions.shape == (1, 6)
-        assert np.abs(one.lost @ J).max() < 1e-14
-        assert np.abs(J @ one.motions.T).max() < 1e-14
+        assert (one.rank, one.full_rank, bool(one)) == (5, 6, True)
+        assert one.lost_directions.shape == one.null_motions.shape == (1, 6)
+        assert np.abs(one.lost_directions @ J).max() < 1e-14
+        assert np.abs(J @ one.null_motions.T).max() < 1e-14
     assert robot.certificate().verified, "the explanation computes unchecked Jacobians"
 
 
@@ -382,12 +384,12 @@ def test_a_regular_configuration_near_a_singularity_is_not_singular() -> None:
 def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> None:
     robot = urdfkin.load(urdfs.chain([""] * 5, origin='xyz="0.3 0 0"'))
     one = found(robot, [0.1, 0.2, 0.3, 0.4, 0.5])
-    assert (one.rank, one.full, len(one.lost), len(one.motions)) == (3, 5, 0, 2)
+    assert (one.rank, one.full_rank, len(one.lost_directions), len(one.null_motions)) == (3, 5, 0, 2)
     assert one.reasons == (
         "Random configurations have the same rank, so the arm is the cause, not this configuration.",
     )
     stretched = found(robot, np.zeros(5), "linear")
-    assert stretched.lost.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    assert stretched.lost_directions.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
 
 
 def test_the_rotation_of_the_base_rotates_the_lost_direction() -> None:
@@ -395,14 +397,14 @@ def test_the_rotation_of_the_base_rotates_the_lost_direction() -> None:
     turn = np.eye(4)
     turn[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     one = robot.singular_values(robot.neutral(), "tool0", base=BaseMotion(turn)).singularity()
-    assert one.lost.round(9).tolist() == [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
+    assert one.lost_directions.round(9).tolist() == [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 
 
 def explained(J: FloatArray, turns: bool | None = True) -> Singularity:
     generic = np.random.default_rng(1).normal(size=(2, *J.shape))
     names, active = tuple(f"j{i}" for i in range(J.shape[1])), np.ones(J.shape, dtype=bool)
     error, turning = np.full(J.shape, 1e-15), (turns,) * J.shape[1]
-    columns = FrameColumns(J, error, "tip", names, turning, active, lambda: generic, moving_base=False)
+    columns = FrameJacobian(J, error, "tip", names, turning, active, lambda: generic, moving_base=False)
     return singular_values(J, error, active[0], slice(0, 6), columns).singularity()
 
 
@@ -416,7 +418,7 @@ def test_the_explanation_names_the_line_that_six_axes_meet() -> None:
     along, start = np.array([0.0, 0.0, 1.0]), np.array([0.2, 0.1, 0.0])
     points = start + rng.normal(size=(6, 1)) * along
     one = explained(axes(points, rng.normal(size=(6, 3))))
-    assert (one.rank, one.full) == (5, 6)
+    assert (one.rank, one.full_rank) == (5, 6)
     assert any("through the point at (0.2, 0.1, 0) m from the origin of tip" in line for line in one.reasons)
     assert one.reasons[-1].startswith("These joint velocities do not move tip: ")
 

@@ -18,7 +18,7 @@ from urdfkin.cli import streams
 from urdfkin.cli.exit import run
 from urdfkin.cli.streams import wrap_streams
 from urdfkin.errors import UnknownNameError, UrdfkinError
-from urdfkin.verify.quantities import by_command
+from urdfkin.verify.quantities import quantities_by_command
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -91,7 +91,9 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    rows = {name: ("quantity", f"Compute the {row.summary}.") for name, row in by_command().items()}
+    rows = {
+        name: ("quantity", f"Compute the {row.summary}.") for name, row in quantities_by_command().items()
+    }
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
@@ -170,7 +172,7 @@ class LazyGroup(click.Group):
         module_name, _ = commands()[cmd_name]
         module = importlib.import_module(f"urdfkin.cli.{module_name}")
         command = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
-        return cast("click.Command", command or module.make_command(by_command()[cmd_name]))
+        return cast("click.Command", command or module.make_command(quantities_by_command()[cmd_name]))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

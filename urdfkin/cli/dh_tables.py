@@ -128,7 +128,7 @@ def _write_tables(request: DHRequest) -> Answer:
     if len(tips) > 1:
         _require_format(request, "--all", _FORMATS_OF_SEVERAL)
     tables = [_make_table(request, tip, request.snap) for tip in tips]
-    checks = [verifier.table(table) if verifier.policy else None for table in tables]
+    checks = [verifier.check_table(table) if verifier.policy else None for table in tables]
     results = list(zip(tables, checks, strict=True))
     if format_ == "json":
         lock = lock_settings(request.robot)
@@ -142,7 +142,7 @@ def _write_tables(request: DHRequest) -> Answer:
         for table, check in results:
             for line in _lines_below_table(request, table, check):
                 say(line, err=True)
-    code = 0 if all(check is not None and check.within for check in checks) else 3
+    code = 0 if all(check is not None and check.is_within_bounds for check in checks) else 3
     return _make_answer(request, text, code)
 
 
@@ -209,7 +209,7 @@ def _write_tree(request: DHRequest) -> Answer:
         text = as_csv(parameters)
     else:
         text = tree_document(parameters, request.units).render(format_)
-    check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
+    check = robot.verifier.check_tree_parameters(parameters) if robot.verifier.policy else None
     check_line = "\n".join([str(check or format_path_check(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
         q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q

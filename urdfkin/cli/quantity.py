@@ -56,7 +56,7 @@ from urdfkin.verify.quantities import (
     ANALYTICAL_JACOBIAN,
     IMU,
     PLACEMENT,
-    SIX,
+    SIX_VECTOR_LABELS,
     Quantity,
     replay_line,
 )
@@ -164,7 +164,7 @@ _breakdown = click.option(
 def make_command(quantity: Quantity) -> click.Command:
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
-    own = [reference_option] if quantity.referred else []
+    own = [reference_option] if quantity.has_reference else []
 
     @quantity_options(quantity.inputs, *own, last=(_breakdown,) if has_breakdown else ())
     def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
@@ -180,10 +180,10 @@ def make_command(quantity: Quantity) -> click.Command:
             if x.conversion is not None:
                 J = partial(x.robot.jacobian, x.q, x.frame, reference, base=x.base)
                 result = x.conversion.convert_result(quantity.name, (x.q, x.v), result, J)
-        return _answer(x, quantity, result, reference if quantity.referred else None)
+        return _answer(x, quantity, result, reference if quantity.has_reference else None)
 
     summary = f"{quantity.summary[0].upper()}{quantity.summary[1:]} (eq. {', '.join(quantity.equations)})."
-    compute.__doc__ = f"{summary}\n\n{quantity.page}\n\n{_ROBOT}"
+    compute.__doc__ = f"{summary}\n\n{quantity.help_text}\n\n{_ROBOT}"
     return click.command(quantity.command, epilog=f"Example: {quantity.example}")(compute)
 
 
@@ -192,9 +192,9 @@ def make_command(quantity: Quantity) -> click.Command:
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
     x = x.convert_inputs()
-    if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
+    if x.conversion and x.conversion.angular_first and quantity.labels == SIX_VECTOR_LABELS:
         units = dict(reversed(list(quantity.units.items())))
-        quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
+        quantity = replace(quantity, labels=(*SIX_VECTOR_LABELS[3:], *SIX_VECTOR_LABELS[:3]), units=units)
     settings = [
         f"{name.replace('_', ' ')} {word}" for name, word in x.settings.items() if isinstance(word, str)
     ]
@@ -236,7 +236,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 
 
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
-    if quantity.columns and not x.is_trajectory:
+    if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
         # The CSV of a Hessian has one line for each entry of the Jacobian, with the entry's derivatives.
         keys = [[row] for row in quantity.labels]
@@ -247,7 +247,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
             yield from ([k, *key, *map(repr, row)] for key, row in zip(keys, J, strict=True))
     else:
         names = list(quantity.labels) or [f"T{i}{j}" for i in range(4) for j in range(4)]
-        if quantity.columns:
+        if quantity.has_columns:
             several = product(names, *[x.velocity_names] * (quantity.axes - 1))
             names = [csv_cell(" ".join(words)) for words in several]
         yield [_TIME[x.t is not None], *names]
@@ -264,7 +264,7 @@ def _times(x: Inputs) -> Iterable[object]:
 
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
-    if quantity.columns:
+    if quantity.has_columns:
         return _columns(quantity, x.velocity_names, value)
     if not quantity.units:
         relative_to = x.settings.get("relative_to", "the world")
@@ -317,7 +317,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         yield from _format_samples(x, 2, "csv, json or npy", table)
 
     def rows() -> Iterator[list[object]]:
-        yield [_TIME[x.t is not None], "joint", "kind", *SIX]
+        yield [_TIME[x.t is not None], "joint", "kind", *SIX_VECTOR_LABELS]
         for k, t in enumerate(_times(x)):
             for joint, kind, six in found.contributions((k,)):
                 yield [t, csv_cell(joint), kind, *map(repr, six.tolist())]
@@ -325,7 +325,11 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def data() -> dict[str, Any]:
         about = {"quantity": "acceleration breakdown", "frame": x.frame, "reference": reference}
-        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(ACCELERATION_KINDS)}
+        axes = {
+            "rows": list(SIX_VECTOR_LABELS),
+            "joints": list(found.joints),
+            "kinds": list(ACCELERATION_KINDS),
+        }
         return _metadata(x, "qva", **about, **axes) | {
             name: getattr(found, name).tolist() for name in ("base", "terms", "total")
         }
@@ -566,7 +570,12 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             "manipulability": as_json_data(found.manipulability._asdict()),
             "manipulability_gradient": as_json_data(gradient),
             "singularities": [
-                {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
+                {
+                    "rank": one.rank,
+                    "full": one.full_rank,
+                    "lost": one.lost_directions.tolist(),
+                    "reasons": one.reasons,
+                }
                 if one
                 else None
                 for one in map(found.singularity, range(len(gradient)))

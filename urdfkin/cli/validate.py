@@ -29,7 +29,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_command
 from urdfkin.urdf.catalogue import example_robots
-from urdfkin.verify.quantities import compared, not_compared
+from urdfkin.verify.quantities import compared_titles, uncompared_titles
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
@@ -131,7 +131,7 @@ _T = TypeVar("_T", bound=click.Command)
 
 def _with_quantities(command: _T) -> _T:
     assert command.help is not None
-    command.help = command.help.format(compared=compared(), not_compared=not_compared())
+    command.help = command.help.format(compared=compared_titles(), not_compared=uncompared_titles())
     return command
 
 

@@ -82,7 +82,7 @@ class LibraryReading:
 
 
 def installed_libraries(form: str = "urdf") -> tuple[str, ...]:
-    return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
+    return tuple(name for name, one in LIBRARIES.items() if form in one.formats and version(name) is not None)
 
 
 def compare_readers(
@@ -101,7 +101,7 @@ def compare_readers(
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
     if not names:
-        could = [one.package for one in LIBRARIES.values() if form in one.forms]
+        could = [one.package for one in LIBRARIES.values() if form in one.formats]
         raise InputError(
             f"no installed library reads {form.upper()}", remedy=f"pip install {' '.join(could)}"
         )
@@ -135,7 +135,7 @@ def _compare_reader(
 ) -> LibraryReading:
     """Run a library in a separate process, and compare its poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
-    if form not in LIBRARIES[name].forms:
+    if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
     values = [joint_values(robot, one) for one in q]
     command = python_command("from urdfkin.verify.adapters import main; main()")
@@ -148,7 +148,7 @@ def _compare_reader(
     if "error" in answer:
         return LibraryReading(title, number, escape_unprintable(answer["error"])[:_MAX_CHARACTERS])
     links = robot.link_names
-    tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].single else _TOLERANCE
+    tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].is_single_precision else _TOLERANCE
     tolerance *= max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in poses for poses in answer["poses"])]
     if not shared:

@@ -461,7 +461,7 @@ class Comparator:
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
-            if (reason := robot.verifier.cannot()) is not None:
+            if (reason := robot.verifier.find_refusal()) is not None:
                 return Confirmation("not verified", reason=reason)
         distances = self.pinocchio_distances(alignment, variables)
         for interval, metres in zip(frames, distances, strict=False):
@@ -473,7 +473,7 @@ class Comparator:
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
         return Confirmation(
-            "confirmed", PINOCCHIO.words, CONFIRMATION_SAMPLES, float(distances.max(initial=0.0))
+            "confirmed", PINOCCHIO.name_and_version, CONFIRMATION_SAMPLES, float(distances.max(initial=0.0))
         )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
@@ -624,7 +624,7 @@ class JointComparison:
 
     **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding can shift the
     frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
-    `urdfkin.verify.usd_check.single_precision` computes w_i and e_i from the numbers of joint i. Let R_i be
+    `urdfkin.verify.usd_check.bound_single_precision_errors` computes w_i and e_i from the numbers of joint i. Let R_i be
     the constant rotation of joint i, and p_i the position of its origin. Let R*_i and p*_i be the exact
     values. The angle of a product of rotations is at most the sum of their angles. The angle between the
     product R_1 ... R_n and the product R*_1 ... R*_n is therefore at most

@@ -191,7 +191,9 @@ class PreparedFrame:
         compute, args = make_single_evaluator(quantity, self._plan, self.reference)
         verifier = self._robot.verifier
         if self.verify:
-            compute = verifier.with_check(quantity, compute, self._plan, self.frame, self.reference)
+            compute = verifier.make_checked_function(
+                quantity, compute, self._plan, self.frame, self.reference
+            )
         else:
             verifier.ledger.account(quantity).counters.append((args, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)

@@ -18,7 +18,7 @@ from urdfkin.export.proof import Proof, make_proof
 from urdfkin.model.configuration import coordinate_names, velocity_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
-from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
+from urdfkin.verify.quantities import Quantity, find_quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
 #: Precedences of operators, the lowest first.
@@ -108,7 +108,7 @@ def make_verified_code(
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
     rows = _parse_quantities(quantities)
-    if not tree.nv and any(row.columns for row in rows):
+    if not tree.nv and any(row.has_columns for row in rows):
         raise InputError(
             "the Jacobian has no columns",
             where=tree.name,
@@ -161,7 +161,7 @@ def exportable_quantities() -> list[Quantity]:
 
 def _parse_quantities(names: Collection[str]) -> list[Quantity]:
     checked = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
-    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
+    rows = [find_quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
     possible = ", ".join(row.method for row in exportable_quantities())
     if not rows:
         raise InputError("no quantity to export", remedy=f"name some of {possible}")

@@ -344,7 +344,7 @@ class CompiledFrame:
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
             return None
-        compute, task = wrap_c_function(core, len(row.inputs), row.own_shape(self._plan.nv), self._plan)
+        compute, task = wrap_c_function(core, len(row.inputs), row.result_shape(self._plan.nv), self._plan)
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
@@ -369,8 +369,8 @@ class CompiledFrame:
         task.argtypes, task.restype = [ctypes.c_void_p], ctypes.c_int64
         samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
         call = self._make_call((samples.q, samples.v, samples.a)[: len(row.inputs)])
-        result = call.in_shape(self._run_call(task, row, call, None, 1))
-        verifier.check(row, call, result, verifier.policy_of_call(None))
+        result = call.restore_shape(self._run_call(task, row, call, None, 1))
+        verifier.check(row, call, result, verifier.resolve_policy(None))
         return task
 
     def _make_call(self, inputs: Sequence[ConfigurationLike]) -> Call:
@@ -389,13 +389,13 @@ class CompiledFrame:
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
-                self._robot.verifier.ledger.unchecked(name, len(out))
+                self._robot.verifier.ledger.count_unchecked(name, len(out))
                 return out
         call = self._make_call(inputs)
-        to = call.flat(out, row.own_shape(self._tree.nv))
+        to = call.flatten_out(out, row.result_shape(self._tree.nv))
         result = call.compute(self._run_call, task, row, call, to, threads)
-        self._robot.verifier.ledger.unchecked(name, call.results)
-        return call.in_shape(result) if out is None else out
+        self._robot.verifier.ledger.count_unchecked(name, call.result_count)
+        return call.restore_shape(result) if out is None else out
 
     def _are_plain(
         self, inputs: Sequence[ConfigurationLike], row: Quantity, out: FloatArray
@@ -407,7 +407,7 @@ class CompiledFrame:
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
-            out, (n, *row.own_shape(self._tree.nv))
+            out, (n, *row.result_shape(self._tree.nv))
         )
         width = self._tree.nq
         for x in inputs:
@@ -419,7 +419,7 @@ class CompiledFrame:
         self, task: Any, row: Quantity, call: Call, out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         inputs = [np.ascontiguousarray(x) for x in (call.q, *call.rates)]
-        result = np.empty((call.n, 1, *row.own_shape(self._tree.nv))) if out is None else out
+        result = np.empty((call.n, 1, *row.result_shape(self._tree.nv))) if out is None else out
         self._run(task, row, inputs, result, threads)
         if self._plan.is_large and not np.isfinite(result).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
@@ -433,7 +433,9 @@ class CompiledFrame:
             arguments[_N], arguments[_OUT] = len(part), address(part)
             # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
             # Therefore the buffer `stage` has extra space.
-            stage = aligned_empty(LANES * part[0].size + LANES) if row.columns and uses_buffer(out) else None
+            stage = (
+                aligned_empty(LANES * part[0].size + LANES) if row.has_columns and uses_buffer(out) else None
+            )
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):
                 arguments[index] = address(x)

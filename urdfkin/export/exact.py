@@ -24,7 +24,14 @@ from urdfkin.export.proof import Proof, compare_with_pinocchio
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.exact.numbers import DIGITS, NumberType, enough_digits, exact, precision, read_exact
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    NumberType,
+    as_interval,
+    enough_digits,
+    precision,
+    read_exact_joints,
+)
 from urdfkin.verify.verifier import Verifier
 
 #: Largest angle (rad) that may become a multiple of pi/12.
@@ -90,7 +97,7 @@ def make_exact_plan(
 ) -> CompiledTree:
     graph.step = -1
     eq, path = graph.chapter, tree.path(link)
-    joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
+    joints = read_exact_joints(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
     R, p, rows = IDENTITY, ZERO, list[tuple[Number, ...]]()
     for i in path:
         joint, own = tree.joints[i], joints[i]
@@ -125,8 +132,8 @@ def _aligning(axis: Vector, z: float) -> Matrix:
 def to_interval(x: Number) -> Number:
     """Return an exact constant as an interval (midpoint and radius)."""
     if isinstance(x, PiMultiple):
-        return exact(0).pi() * to_interval(x.factor)
-    return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
+        return as_interval(0).pi() * to_interval(x.factor)
+    return as_interval(x.numerator) / x.denominator if isinstance(x, Fraction) else as_interval(x)
 
 
 _OPERATIONS: dict[str, Callable[..., Number]] = {
@@ -150,7 +157,7 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 
     for node in function.nodes:
         if node.op in INPUT_LETTERS:
-            values[node] = exact(inputs[INPUT_LETTERS.index(node.op)][node.operands[0]])
+            values[node] = as_interval(inputs[INPUT_LETTERS.index(node.op)][node.operands[0]])
         else:
             values[node] = _OPERATIONS[node.op](*map(value, node.operands))
     return list(map(value, function.results))

@@ -36,7 +36,7 @@ def make_robot_code(
 ) -> FrameCode:
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
-    verify = bool(robot.verifier.policy_of_call(verify))
+    verify = bool(robot.verifier.resolve_policy(verify))
     if form == "tree":
         return make_verified_code(
             robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify

@@ -66,7 +66,7 @@ class Function:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return self.quantity.own_shape(self.plan.nv)
+        return self.quantity.result_shape(self.plan.nv)
 
     @cached_property
     def nodes(self) -> list[Node]:

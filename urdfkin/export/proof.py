@@ -26,10 +26,17 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
-from urdfkin.verify.call import Call, Part
+from urdfkin.verify.call import Call, CallPart
 from urdfkin.verify.certificate import Certificate
-from urdfkin.verify.exact.numbers import DIGITS, conversion, enough_digits, exact, precision, read_exact
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    as_interval,
+    conversion_errors,
+    enough_digits,
+    precision,
+    read_exact_joints,
+)
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared with Pinocchio.
@@ -87,7 +94,7 @@ class Proof:
         else:
             verdict = [f"Verified by {oracle}, the expressions below evaluated {self.precision_text}:"] + [
                 f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
-                f" eps*scale, {line.share:.2%} of the bound"
+                f" eps*scale, {line.share_of_bound:.2%} of the bound"
                 for line in self.certificate.lines
             ]
         return [
@@ -156,7 +163,7 @@ def compare_with_pinocchio(
         inputs = (samples.q, samples.v, samples.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
         found = evaluate(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.policy_of_call(verify)))
+        checker.check(function.quantity, call, found, bool(checker.resolve_policy(verify)))
     return checker.certificate()
 
 
@@ -172,14 +179,14 @@ def _make_vectors(
     link = tree.frame_link(frame)
     samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_special=False)
     inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (samples.q, samples.v, samples.a))
-    part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTOR_COUNT))
+    part = Call(tree, plan_of, frame, reference, None, inputs).select(slice(0, VECTOR_COUNT))
     tolerances, single_tolerances, largest_bounds = (
         dict[str, FloatArray](),
         dict[str, FloatArray](),
         dict[str, float](),
     )
     path, vectors = tree.path(link), []
-    errors = conversion(verifier.text, tree, path, part.q)
+    errors = conversion_errors(verifier.text, tree, path, part.q)
     for f in functions:
         tolerances[f.name], scale = _find_tolerances(f, part, errors)
         single_tolerances[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * tolerances[f.name]
@@ -188,10 +195,10 @@ def _make_vectors(
         )
         largest_bounds[f.name] = float(relative_bounds.max(initial=0.0))
     with precision(DIGITS + enough_digits(len(path))):
-        joints = read_exact(verifier.text, tree, path)
+        joints = read_exact_joints(verifier.text, tree, path)
         for k in range(VECTOR_COUNT):
-            motion = move(tree, joints, *(x[k] for x in inputs))
-            true = {f.name: f.quantity.truth(motion, link, reference).ravel() for f in functions}
+            motion = compute_motion(tree, joints, *(x[k] for x in inputs))
+            true = {f.name: f.quantity.enclose(motion, link, reference).ravel() for f in functions}
             vectors.append(
                 ExportVector(
                     tuple(x[k].tolist() for x in inputs),
@@ -203,7 +210,9 @@ def _make_vectors(
     return tuple(vectors), largest_bounds
 
 
-def _find_tolerances(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
+def _find_tolerances(
+    function: Function, part: CallPart, errors: DecimalErrors
+) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds of a function's results, in eps, and the scales of these results.
 
     Both arrays have the shape (n, numbers). Each error bound is a factor k times the scale of the result.
@@ -219,7 +228,7 @@ def _find_tolerances(function: Function, part: Part, errors: DecimalErrors) -> t
 
 def format_decimal(x: Number) -> str:
     """Return fifty digits of an interval, without final zeros; 0.0 if the interval contains 0."""
-    ball = exact(x)
+    ball = as_interval(x)
     if ball.contains(0):
         return "0.0"
     digits, e, exponent = ball.str(DIGITS, radius=False).partition("e")

@@ -103,7 +103,7 @@ def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[st
     """Map each heading of the table of robots to the quantities in the column."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
-        head = QUANTITIES[name].head if name in QUANTITIES else name
+        head = QUANTITIES[name].heading if name in QUANTITIES else name
         heads[head] = (*heads.get(head, ()), name)
     return heads
 

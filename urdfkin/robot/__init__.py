@@ -41,7 +41,7 @@ from urdfkin.system.lazy_import import get_hook
 from urdfkin.system.locks import import_lock
 from urdfkin.urdf.findings import Finding, Findings
 from urdfkin.urdf.sources import Origin, find_entry
-from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
+from urdfkin.verify.bounds import compute_magnitudes, find_active_entries, singularity_margin
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.oracles import OracleName
@@ -52,11 +52,11 @@ from urdfkin.verify.quantities import (
     PLACEMENT,
     QUANTITIES,
     RELATIVE_PLACEMENT,
-    quantity,
+    find_quantity,
     recursive_quantities,
 )
 from urdfkin.verify.singular_values import SingularValues, singular_values
-from urdfkin.verify.singularity import FrameColumns, axis_kinds
+from urdfkin.verify.singularity import FrameJacobian, find_revolute_columns
 from urdfkin.verify.verifier import Verifier, Verify
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention, Conversion
     from urdfkin.robot.convention_robot import ConventionRobot
     from urdfkin.verify.exact.enclosure import Enclosures
-    from urdfkin.verify.usd_check import SinglePrecision
+    from urdfkin.verify.usd_check import SinglePrecisionErrors
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
@@ -159,7 +159,7 @@ class Robot(Displayable):
         )
         self.findings = Findings(findings)
         #: Bounds on the errors of poses that a USD stage stores in single precision; None for other sources.
-        self.single: SinglePrecision | None = None
+        self.single: SinglePrecisionErrors | None = None
         #: USD path of each link's prim (scene object), for a robot from a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
@@ -621,7 +621,7 @@ class Robot(Displayable):
         >>> bool(abs(T - robot.placement(q, "tool0")).max() < 1e-14)
         True
         """
-        return self.verifier.model(mimic=as_bool(mimic, "mimic"))
+        return self.verifier.make_pinocchio_model(mimic=as_bool(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
@@ -718,7 +718,7 @@ class Robot(Displayable):
         locked = configuration.parse_locks(self.tree, lock, chosen)
         robot = copy(self)
         robot.tree = with_locks(self.tree, locked)
-        robot.verifier = self.verifier.locked(robot.tree, tuple(locked.items()))
+        robot.verifier = self.verifier.with_lock(robot.tree, tuple(locked.items()))
         robot._tip_frame = self._tip_frame if self._has_one_tip else None
         return robot
 
@@ -752,7 +752,7 @@ class Robot(Displayable):
         >>> arm.compute("velocity", ([0.0, 0.0], [1.0, 0.0]), "tip").tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        row = quantity(as_str(name, "name"))
+        row = find_quantity(as_str(name, "name"))
         if row not in recursive_quantities():
             raise InputError(f"the {name} has a method of its own", remedy=f"call {row.method}")
         if not isinstance(inputs, tuple | list) or len(inputs) != len(row.inputs):
@@ -815,11 +815,11 @@ class Robot(Displayable):
         # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
-        to = call.flat(out, (4, 4))
+        to = call.flatten_out(out, (4, 4))
         self.verifier.require_pinocchio(verify)
-        T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
+        T_world = call.compute(PLACEMENT.compute_results, call.plan, (call.q,), None, threads=threads)
         T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
-        result = call.in_shape(T) if out is None else out
+        result = call.restore_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result
 
@@ -1056,16 +1056,16 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         J = self.jacobian(q, as_str(frame, "frame"), base=base, verify=verify, threads=threads)
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,))
-        size = magnitudes(call.plan, call.q, None, None, call.state)
+        size = compute_magnitudes(call.plan, call.q, None, None, call.state)
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
-        active = movable(call.plan)[0]
-        columns = FrameColumns(
+        active = find_active_entries(call.plan)[0]
+        columns = FrameJacobian(
             J,
             error,
             str(frame),
             self.velocity_names,
-            axis_kinds(self.tree),
+            find_revolute_columns(self.tree),
             active,
             partial(self._sample_jacobians, frame),
             moving_base=base is not None,
@@ -1122,14 +1122,14 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
         self.verifier.require_pinocchio(verify)
-        if self.verifier.policy_of_call(verify):
-            nearest = max(nearest, nearest_singularity(call.plan))
+        if self.verifier.resolve_policy(verify):
+            nearest = max(nearest, singularity_margin(call.plan))
         rows = 7 if representation == "quaternion" else 6
-        to = call.flat(out, (rows, self.nv))
+        to = call.flatten_out(out, (rows, self.nv))
         J = np.empty((call.n, len(call.links), rows, self.nv)) if to is None else to
         walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
-        Rs = call.compute(PLACEMENT.ours, *walk, **state)[..., :3, :3]
-        Js_v = call.compute(JACOBIAN.ours, *walk, out=J if rows == 6 else None, **state)
+        Rs = call.compute(PLACEMENT.compute_results, *walk, **state)[..., :3, :3]
+        Js_v = call.compute(JACOBIAN.compute_results, *walk, out=J if rows == 6 else None, **state)
         too_near: list[tuple[float, int]] = []
 
         def compute(part: slice) -> None:
@@ -1145,10 +1145,10 @@ class Robot(Displayable):
         compute_in_parts(compute, call.n, threads)
         if too_near:
             distance, k = min(too_near)
-            raise RepresentationSingularityError(representation, distance, call.index(k))
+            raise RepresentationSingularityError(representation, distance, call.batch_index(k))
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        result = call.in_shape(J) if out is None else out
+        result = call.restore_shape(J) if out is None else out
         self.verifier.check(ANALYTICAL_JACOBIAN, call, result, verify)
         return result
 
@@ -1193,7 +1193,7 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
         self.verifier.require_pinocchio(verify)
-        to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(ACCELERATION_KINDS), 6))
+        to = call.flatten_out(out, (len(moving_joints(self.tree, call.links[0])), len(ACCELERATION_KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
             ACCELERATION_BREAKDOWN.compute, *flat, out=None if to is None else to[:, 0], threads=threads
@@ -1245,7 +1245,7 @@ class Robot(Displayable):
         >>> q, v, a = [0.3, -0.4], [1.0, 0.5], [0.0, 0.2]
         >>> proof = arm.enclose(q, v, a, arm.tip_frame)
         >>> J = arm.jacobian(q, arm.tip_frame)
-        >>> bool((proof.jacobian.error(J) < 4e-16).all())
+        >>> bool((proof.jacobian.error_bound(J) < 4e-16).all())
         True
         """
         with import_lock:
@@ -1524,8 +1524,8 @@ class Robot(Displayable):
             slide=as_str(slide, "slide"),
             like=like,
         )
-        if self.verifier.policy_of_call(verify):
-            self.verifier.table(table)
+        if self.verifier.resolve_policy(verify):
+            self.verifier.check_table(table)
         return table
 
     def screws(
@@ -1553,7 +1553,7 @@ class Robot(Displayable):
             from urdfkin.verify.conversions import check_screws
 
         found = make_screws(self.chain(tip, base))
-        if self.verifier.policy_of_call(verify):
+        if self.verifier.resolve_policy(verify):
             check_screws(self.verifier, found)
         return found
 
@@ -1575,8 +1575,8 @@ class Robot(Displayable):
             from urdfkin.dh.tree_parameters import make_tree_parameters
 
         parameters = make_tree_parameters(self.tree)
-        if self.verifier.policy_of_call(verify):
-            self.verifier.tree_parameters(parameters)
+        if self.verifier.resolve_policy(verify):
+            self.verifier.check_tree_parameters(parameters)
         return parameters
 
     # -- verification --------------------------------------------------------------------------------
@@ -1616,27 +1616,27 @@ class Robot(Displayable):
         row = QUANTITIES[name]
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
-        to = call.flat(out, row.own_shape(self.nv))
+        to = call.flatten_out(out, row.result_shape(self.nv))
         self.verifier.require_pinocchio(verify)
         results = call.compute(
-            row.ours,
+            row.compute_results,
             call.plan,
             (call.q, *call.rates),
             call.reference,
             base=call.state,
             out=to,
             threads=threads,
-            keep_in_cache=self.verifier.policy_of_call(verify) is True,
+            keep_in_cache=self.verifier.resolve_policy(verify) is True,
             **options,
         )
-        result = call.in_shape(results) if out is None else out
+        result = call.restore_shape(results) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
 
     def _sample_jacobians(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
-        J: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
+        J: FloatArray = call.compute(JACOBIAN.compute_results, call.plan, (call.q,), _ALIGNED)
         return J[:, 0]
 
     def _find_evaluator(

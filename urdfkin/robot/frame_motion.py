@@ -20,11 +20,18 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import Trajectory
-from urdfkin.verify.bounds import movable, result_k
+from urdfkin.verify.bounds import find_active_entries, result_k
 from urdfkin.verify.call import Call
-from urdfkin.verify.comparison import worst_of_each
-from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, PLACEMENT, VELOCITY, Quantity, validated
-from urdfkin.verify.verifier import oracle_results_with_bound
+from urdfkin.verify.comparison import worst_disagreements
+from urdfkin.verify.quantities import (
+    ACCELERATION,
+    JACOBIAN,
+    PLACEMENT,
+    VELOCITY,
+    Quantity,
+    validated_quantities,
+)
+from urdfkin.verify.verifier import compute_oracle_results_with_bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +62,7 @@ class FrameMotion:
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
-        movable: (6, nv) booleans. False: this entry of the Jacobian is 0 in every configuration.
+        active_entries: (6, nv) booleans. False: this entry of the Jacobian is 0 in every configuration.
         breakdown: Contributions to the acceleration, for each joint and each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
@@ -72,7 +79,7 @@ class FrameMotion:
     velocity: FloatArray
     acceleration: FloatArray
     jacobian: FloatArray
-    movable: NDArray[np.bool_]
+    active_entries: NDArray[np.bool_]
     breakdown: AccelerationBreakdown
     checks: dict[str, MotionCheck]
     unverified_reason: str | None
@@ -133,7 +140,7 @@ class FrameMotion:
         [0.1683]
         """
         part = self.jacobian[:, rows]
-        moving = self.movable[rows].any(axis=0)
+        moving = self.active_entries[rows].any(axis=0)
         if not moving.any():
             return np.zeros(len(part))
         values = np.linalg.svd(part[:, :, moving], compute_uv=False)
@@ -174,8 +181,11 @@ def frame_motion(
         raise InputError("motion must be a trajectory, or q, v and a", found=f"{len(given)} arrays")
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
     inputs, reference, state = (call.q, *call.rates), call.reference, call.state
-    ours = {row: call.compute(row.ours, call.plan, inputs, reference, base=state) for row in validated()}
-    reason = robot.verifier.cannot(call.base)
+    ours = {
+        row: call.compute(row.compute_results, call.plan, inputs, reference, base=state)
+        for row in validated_quantities()
+    }
+    reason = robot.verifier.find_refusal(call.base)
     placement, velocity, acceleration, jacobian = (
         ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)
     )
@@ -186,7 +196,7 @@ def frame_motion(
         velocity,
         acceleration,
         jacobian,
-        movable(call.plan, reference)[0],
+        find_active_entries(call.plan, reference)[0],
         call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state),
         {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,
@@ -194,9 +204,9 @@ def frame_motion(
 
 
 def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> MotionCheck:
-    theirs, bound = oracle_results_with_bound(
-        row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours
+    theirs, bound = compute_oracle_results_with_bound(
+        row, robot.verifier.oracle(call.base), call.select(slice(0, call.n)), ours
     )
-    units = worst_of_each(ours, theirs, bound.scale, 2)
+    units = worst_disagreements(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(result_k(bound, units.shape), units.shape)
     return MotionCheck(units[:, 0], (units / k)[:, 0], k[:, 0])

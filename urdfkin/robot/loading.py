@@ -163,7 +163,9 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
             UrdfText(foreign[0].encode(), foreign[1], foreign[1]), **options, source_findings=lost
         )
         if lost:
-            robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
+            robot.verifier.source_notes = (
+                "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
+            )
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     streamed = source == "-" or hasattr(source, "read")
@@ -239,13 +241,13 @@ def _load_mjcf(
         else source_name(source)
     )
     text = UrdfText(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
-    source_findings = make_mjcf_findings(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
+    source_findings = make_mjcf_findings(read.remarks, name, data.removeprefix(codecs.BOM_UTF8))
     robot = make_robot(text, **options, source_findings=source_findings, is_generated=True)
     if checks:
         verifier = _load_without_options(
             robot, text, source_findings=source_findings, is_generated=True
         ).verifier
-        robot.verifier.reading = check_mjcf_source(verifier, read)
+        robot.verifier.source_notes = check_mjcf_source(verifier, read)
     return robot
 
 
@@ -259,7 +261,7 @@ def _load_usd(
     import hashlib
 
     from urdfkin.urdf.lint.rules.left_out import make_usd_findings
-    from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision
+    from urdfkin.verify.usd_check import bound_single_precision_errors, check_usd_source, read_usd
 
     _reject_xacro_args(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
@@ -282,10 +284,10 @@ def _load_usd(
     line, remarks = check_usd_source(verifier, read)
     source_findings = make_usd_findings((*read.remarks, *remarks), name, data)
     robot = make_robot(text, **options, source_findings=source_findings, is_generated=True)
-    robot.single = single_precision(robot.tree, read.answer["single"])
+    robot.single = bound_single_precision_errors(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]
     if checks:
-        robot.verifier.reading = line
+        robot.verifier.source_notes = line
     return robot
 
 
@@ -318,7 +320,7 @@ def _load_model(
     robot = make_robot(text, **options, is_generated=True)
     if as_verify(options["verify"]):
         verifier = _load_without_options(robot, text, is_generated=True).verifier
-        robot.verifier.reading = check_model_source(verifier, read, source)
+        robot.verifier.source_notes = check_model_source(verifier, read, source)
     return robot
 
 

@@ -32,21 +32,21 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.bounds import (
+    compute_magnitudes,
     euler_jacobian_bound,
-    magnitudes,
-    nearest_singularity,
     quaternion_jacobian_bound,
     result_k,
+    singularity_margin,
 )
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
-from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle import BaseRows, davenport
-from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
-from urdfkin.verify.verifier import bound_of, oracle_results, own_results
+from urdfkin.verify.exact.numbers import DIGITS, as_interval, enough_digits, precision, read_exact_joints
+from urdfkin.verify.exact.recursion import compute_motion, make_base_state
+from urdfkin.verify.oracle import BaseRows, davenport_matrix
+from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated_quantities
+from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_INTERVALS = np.vectorize(exact, otypes=[object])
+_INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
 #: Angles about fixed axes are in no group: the Jacobian of Euler angles has the same rows in reverse order.
 _REPRESENTATIONS = {
@@ -121,23 +121,23 @@ class _AccuracyBatch:
                 found=f"{base.batch_shape}",
             )
         self.oracle = robot.verifier.oracle(base)
-        self.part = Call(robot.tree, robot.plan, robot.link_frames, _ALIGNED, base, (x.q, x.v, x.a)).part(
+        self.part = Call(robot.tree, robot.plan, robot.link_frames, _ALIGNED, base, (x.q, x.v, x.a)).select(
             slice(0, len(x.q))
         )
         self.links = range(len(robot.tree.links))
-        joints, moves = read_exact(robot.urdf, robot.tree), self.part.query.base
+        joints, moves = read_exact_joints(robot.urdf, robot.tree), self.part.query.base
         bases = [
             None if moves is None
-            else on_base(BaseRows(moves.placement[k], moves.velocity[k], moves.acceleration[k]))
+            else make_base_state(BaseRows(moves.placement[k], moves.velocity[k], moves.acceleration[k]))
             for k in range(len(x.q))
         ]  # fmt: skip
         rows = zip(*self.part.query.inputs, bases, strict=True)
-        self.motions = [move(robot.tree, joints, q, v, a, base=own) for q, v, a, own in rows]
+        self.motions = [compute_motion(robot.tree, joints, q, v, a, base=own) for q, v, a, own in rows]
 
     def lines(self) -> Iterator[AccuracyLine]:
         for reference in (None, *Reference):
-            for row in validated():
-                if row.exact is not None and reference in row.references:
+            for row in validated_quantities():
+                if row.compute_intervals is not None and reference in row.references:
                     name = None if reference is None else reference.name.lower()
                     yield _make_line(row.name, name, [self._compute_samples(row, reference)])
         for name, representations in _REPRESENTATIONS.items():
@@ -147,8 +147,11 @@ class _AccuracyBatch:
         reference = _ALIGNED if reference is None else reference
         query = self.part.query._replace(reference=reference)
         part = self.part._replace(reference=reference, query=query)
-        urdfkin_results, pinocchio_results = own_results(row, part), oracle_results(row, self.oracle, query)
-        scale = np.broadcast_to(bound_of(row, part).scale, urdfkin_results.shape)
+        urdfkin_results, pinocchio_results = (
+            compute_own_results(row, part),
+            oracle_results(row, self.oracle, query),
+        )
+        scale = np.broadcast_to(compute_bound(row, part).scale, urdfkin_results.shape)
         return _AccuracySamples(
             urdfkin_results,
             pinocchio_results,
@@ -158,7 +161,7 @@ class _AccuracyBatch:
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
         return np.array(
-            [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
+            [[row.enclose(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
         )
 
@@ -166,7 +169,10 @@ class _AccuracyBatch:
         """Yield analytical Jacobians, except near a singularity or if a quaternion's sign is uncertain."""
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
-        size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
+        size, nearest = (
+            compute_magnitudes(plan, x.q, None, None, x.state),
+            max(NEAREST, singularity_margin(plan)),
+        )
         jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
         R, R_pinocchio = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
         moving = _moving_columns(J_v.scale)
@@ -210,7 +216,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
     Both q and -q represent a rotation; the result is the quaternion closer to `near`.
     """
-    K = davenport(R)
+    K = davenport_matrix(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit
@@ -232,7 +238,7 @@ def _make_line(quantity: str, reference: str | None, compared: Sequence[_Accurac
 @partial(np.vectorize, otypes=[float])
 def _error_bound(x: float, true: Number) -> float:
     """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
-    return float(abs(exact(true) - x).upper())
+    return float(abs(as_interval(true) - x).upper())
 
 
 def _summarize_errors(units: FloatArray) -> Errors:

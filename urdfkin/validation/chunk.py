@@ -36,10 +36,10 @@ from urdfkin.validation.error_stats import (
 )
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
-from urdfkin.verify.quantities import SCREWS, Quantity, validated
+from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
 #: Number of samples in one draw.
 DRAW_SIZE = 25
@@ -191,11 +191,12 @@ class SecondOracleModel:
         results: FloatArray,
         oracle_results: FloatArray,
     ) -> CrossCheck:
-        second = block.timings.time_call("second", row.ask, self.oracle, block.query(row, reference))
+        second = block.timings.time_call("second", row.ask_oracle, self.oracle, block.query(row, reference))
         bounds = (
-            row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
+            row.bound(block.plan, size, reference)
+            for size in (block.size, self.library.adapt_magnitudes(block.size))
         )
-        if row.of == "joints":
+        if row.object_kind == "joints":
             bounds = (block.joint_bound(one) for one in bounds)
         return make_cross_check(self.library.name, results, oracle_results, second, *bounds)
 
@@ -242,7 +243,7 @@ class _Block(_ComparisonBatch):
         # The robot's cache keeps the compiled tree for all frames, but not a compiled tree for some frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
-        self.size = magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
+        self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
         # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
         # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -257,10 +258,10 @@ class _Block(_ComparisonBatch):
         and the child link with different functions, so both results are compared.
         """
         inputs = self.x.q, self.x.v, self.x.a
-        for row in validated():
-            joints = [joint for joint in validated("joints") if joint.compute is row.compute]
+        for row in validated_quantities():
+            joints = [joint for joint in validated_quantities("joints") if joint.compute is row.compute]
             for reference in row.references:
-                results = self.timings.time_call("urdfkin", row.ours, self.plan, inputs, reference)
+                results = self.timings.time_call("urdfkin", row.compute_results, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, results, bound, second)
                 for joint in joints:
@@ -271,11 +272,11 @@ class _Block(_ComparisonBatch):
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
-        joints = row.of == "joints"
+        joints = row.object_kind == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        return QueryBatch(frames, inputs, reference, joints=joints, divided=True)
+        return QueryBatch(frames, inputs, reference, frames_are_joints=joints, is_partial=True)
 
     def _compare(
         self,
@@ -285,8 +286,10 @@ class _Block(_ComparisonBatch):
         bound: Bound,
         second: SecondOracleModel | None,
     ) -> tuple[Key, ErrorStats]:
-        names = self.joint_names if row.of == "joints" else self.frames
-        oracle_results = self.timings.time_call("pinocchio", row.ask, self.oracle, self.query(row, reference))
+        names = self.joint_names if row.object_kind == "joints" else self.frames
+        oracle_results = self.timings.time_call(
+            "pinocchio", row.ask_oracle, self.oracle, self.query(row, reference)
+        )
         found = self._compute_stats(results, oracle_results, bound, names)
         if second is not None:
             found = replace(
@@ -306,7 +309,7 @@ class _Screws(_ComparisonBatch):
         tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
         oracle_results = self.timings.time_call(
-            "pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))
+            "pinocchio", SCREWS.ask_oracle, self.oracle, QueryBatch((), (x.q,))
         ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
@@ -322,8 +325,8 @@ class _Screws(_ComparisonBatch):
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
-        size = magnitudes(plan, q, *still, FIXED_BASE_STATE)
-        J = self.timings.time_call("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        size = compute_magnitudes(plan, q, *still, FIXED_BASE_STATE)
+        J = self.timings.time_call("urdfkin", SCREWS.compute_results, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
@@ -359,7 +362,7 @@ def _load(chunk: Chunk) -> _Models:
     memory.check(robot.tree, chunk.samples + SPECIAL_SAMPLES, most)  # The first chunk is the largest.
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
-        second = SecondOracleModel(by, robot.verifier.oracle(by=by))
+        second = SecondOracleModel(by, robot.verifier.oracle(library=by))
     models = robot, robot.verifier.oracle(), second
     _cache[chunk.robot_input] = models
     return models

@@ -306,12 +306,12 @@ class Mistakes:
                 for letter, x in zip("qva", case.inputs, strict=False)
             ]
             found: FloatArray = method(*inputs, frame, verify=False, **named)
-            for axis in range(2, found.ndim) if self.row.columns else ():
+            for axis in range(2, found.ndim) if self.row.has_columns else ():
                 found = found.take(own, axis)
             return found
 
         listed = ", ".join(repr(joint.name) for joint in mimics[:4])
-        if self.row.columns:
+        if self.row.has_columns:
             yield (
                 f"the columns of the mimic joints ({listed}) are not added to the columns of the mimicked"
                 " joints",
@@ -326,7 +326,7 @@ class Mistakes:
         for name, q, v, _ in axes:
             words = f"the joint {name!r} has the opposite sign"
             flipped = self._scale_joints(case.inputs, [(q, v)], -1.0, 3)
-            if self.row.columns:
+            if self.row.has_columns:
                 sign = np.ones(case.expected.shape[-1])
                 sign[v] = -1.0
                 yield words, partial(self._columns_times, case, flipped, sign)
@@ -340,7 +340,7 @@ class Mistakes:
             words = f"the joints {one!r} and {other!r} are exchanged"
             few = self._exchange_joints(case.first(_FIRST_SAMPLES), tuple(at), tuple(to))
             variants = (
-                ((words, True), (f"{words} in q only", False)) if self.row.columns else ((words, False),)
+                ((words, True), (f"{words} in q only", False)) if self.row.has_columns else ((words, False),)
             )
             for sentence, columns in variants:
                 order = np.arange(case.expected.shape[-1])
@@ -357,7 +357,7 @@ class Mistakes:
 
     def _columns_in(self, case: Diagnosis, inputs: Inputs, order: Any) -> FloatArray:
         result = case.compute(inputs)
-        if not self.row.columns:
+        if not self.row.has_columns:
             return result
         found: FloatArray = result[..., order]
         return found[..., order, :] if len(self.row.shape) == 3 else found
@@ -394,7 +394,7 @@ class Mistakes:
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
-        if self.row.against is not None or not names:
+        if self.row.results_and_bound is not None or not names:
             return
         every = case.compute(case.inputs, frame=names)
         for k, name in enumerate(names):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.comparison import worst_disagreements
 
 #: The libraries of a cross check, in the order of the columns of tables.
 CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
@@ -111,7 +111,7 @@ def make_cross_check(
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
-    units = worst_of_each(one, other, bound.scale, 2)
+    units = worst_disagreements(one, other, bound.scale, 2)
     bound_ratio = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     agrees = bound_ratio <= 1.0
     return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(bound_ratio.max()))
@@ -223,7 +223,7 @@ def compute_error_stats(
         return ErrorStats(
             n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None
         )
-    units = worst_of_each(results, oracle_results, bound.scale, 2)
+    units = worst_disagreements(results, oracle_results, bound.scale, 2)
     bound_ratio = units / result_k(bound, units.shape)
     k, f = divmod(int(bound_ratio.argmax()), count)
     q, v, a = inputs[k]

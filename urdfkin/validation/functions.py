@@ -33,8 +33,8 @@ from urdfkin.verify.bounds import result_k
 from urdfkin.verify.comparison import disagreement
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
-from urdfkin.verify.quantities import quantity as quantity_of
-from urdfkin.verify.verifier import Verifier, bound_of, oracle_results_with_bound
+from urdfkin.verify.quantities import find_quantity as quantity_of
+from urdfkin.verify.verifier import Verifier, compute_bound, compute_oracle_results_with_bound
 
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Conversion
@@ -309,14 +309,14 @@ def verify_function(
     if not callable(function):
         raise InputError("the function to check must be callable", found=safe_repr(function))
     row = quantity_of(quantity)
-    if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
+    if row.object_kind != "frames" or row is ACCELERATION_BREAKDOWN:
         raise InputError("urdfkin cannot check functions that compute this quantity", found=quantity)
     run = _Run(
         function,
         robot,
         row,
         frame or robot.tip_frame,
-        None if not row.referred else Reference.of(reference),
+        None if not row.has_reference else Reference.of(reference),
         as_int(samples, "samples", 0),
         as_int(seed, "seed", 0),
         as_finite_float(factor, "factor"),
@@ -380,7 +380,7 @@ class _Run:
         robot = self.robot
         drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self._row_names(), self._column_names())
-        checked = robot.verifier.cannot(None, robot.verifier.library) is None
+        checked = robot.verifier.find_refusal(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH_SIZE):
             part = slice(first, first + _BATCH_SIZE)
             total.add(self._compare(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
@@ -440,15 +440,15 @@ class _Run:
         result = self._method(self.recording, native_inputs, self.frame, None, verify=checked)
         call = self.recorder.calls[row.name]
         flat = result[:, None]
-        part = call.part(slice(0, call.n))
+        part = call.select(slice(0, call.n))
         oracle_results, bound = None, None
         if checked:
             oracle = self.robot.verifier.oracle(call.base, self.robot.verifier.library)
-            oracle_results, bound = oracle_results_with_bound(
+            oracle_results, bound = compute_oracle_results_with_bound(
                 row, oracle, part, flat, self.robot.verifier.library
             )
         else:
-            bound = bound_of(row, part)
+            bound = compute_bound(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
         k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
         inputs: tuple[FloatArray, ...] = native_inputs
@@ -591,17 +591,17 @@ class _Run:
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
         one = copy(self.recorder.calls[self.row.name])
         one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
-        return self.robot.verifier._replay(self.row, one, 0, self.frame)
+        return self.robot.verifier._make_replay_line(self.row, one, 0, self.frame)
 
     def _row_names(self) -> tuple[str, ...]:
         row = self.row
         angular_first = self.conversion is not None and self.conversion.angular_first
         labels = row.labels[3:] + row.labels[:3] if angular_first and len(row.labels) == 6 else row.labels
         nv = (self.conversion or self.robot).nv
-        return labels or tuple(f"row {k}" for k in range(row.own_shape(nv)[0]))
+        return labels or tuple(f"row {k}" for k in range(row.result_shape(nv)[0]))
 
     def _column_names(self) -> tuple[str, ...]:
-        if not self.row.columns:
+        if not self.row.has_columns:
             return ()
         return (self.conversion or self.robot).velocity_names
 

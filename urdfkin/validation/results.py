@@ -101,7 +101,7 @@ class RobotReport:
             return None
         row = QUANTITIES[quantity]
         # The prefix "joint:" is needed because a link may have the same name.
-        frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+        frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
@@ -149,7 +149,7 @@ class RobotReport:
             "bound_ratio": stats.bound_ratio,
             "bound": stats.bounds,
             "histogram": stats.histogram,
-            "subjects": QUANTITIES[quantity].of,
+            "subjects": QUANTITIES[quantity].object_kind,
             "worst_by_subject": stats.worst_by_frame,
             "worst_case": worst_case,
         } | ({"second_oracle": stats.cross_check.as_dict()} if stats.cross_check else {})

@@ -97,8 +97,8 @@ class RobotInput:
     def load(self) -> Robot:
         """Return the robot; raise OracleError if Pinocchio refuses the file or reads a different robot."""
         robot = self.read()
-        if robot.verifier.unverifiable is not None:
-            raise OracleError(robot.verifier.unverifiable, where=self.label)
+        if robot.verifier.known_refusal is not None:
+            raise OracleError(robot.verifier.known_refusal, where=self.label)
         return robot
 
 

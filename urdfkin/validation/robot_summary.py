@@ -27,7 +27,7 @@ from urdfkin.urdf.lint import Finding
 from urdfkin.validation.document import Chain, ReportedDHRow, ReportedModel, ReportedSecondReading
 from urdfkin.validation.document import ReportedFinding as FindingEntry
 from urdfkin.verify.oracle import Oracle
-from urdfkin.verify.second_reader import second_reading
+from urdfkin.verify.second_reader import compare_with_yourdfpy
 from urdfkin.verify.tables import check_table
 
 
@@ -139,7 +139,7 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
         "samples": checks[0].samples,
         "metres": max(check.metres for check in checks),
         "worst": max(units for check in checks for units in check.units.values()),
-        "bound_ratio": max(share for check in checks for share in check.shares.values()),
+        "bound_ratio": max(share for check in checks for share in check.shares_of_bound.values()),
     }
 
 
@@ -155,7 +155,7 @@ class RobotSummary:
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = as_json_data(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
+        reading = as_json_data(compare_with_yourdfpy(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property

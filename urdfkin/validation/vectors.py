@@ -36,8 +36,15 @@ from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
 from urdfkin.verify.bounds import true_value_magnitudes
-from urdfkin.verify.exact.numbers import DIGITS, conversion, decimal, enough_digits, precision, read_exact
-from urdfkin.verify.exact.recursion import move
+from urdfkin.verify.exact.numbers import (
+    DIGITS,
+    conversion_errors,
+    enough_digits,
+    format_decimal,
+    precision,
+    read_exact_joints,
+)
+from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.quantities import (
     ACCELERATION,
     HESSIAN,
@@ -67,7 +74,7 @@ _DIGITS, _FIRST_DIGITS = 3, 12
 SPATIAL_ACCELERATION = replace(
     ACCELERATION,
     name="spatial acceleration",
-    exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: The classical and the spatial acceleration differ by the cross product of angular and linear velocity.
 #: The bound on the classical acceleration includes this product.
@@ -395,9 +402,9 @@ def _results(
         link = tree.frame_link(frame)
         plan, path = robot.plan((link,)), tree.path(link)
         rows = q[np.newaxis], v[np.newaxis], a[np.newaxis]
-        size = true_value_magnitudes(plan, *rows, conversion(robot.urdf, tree, path, rows[0]))
+        size = true_value_magnitudes(plan, *rows, conversion_errors(robot.urdf, tree, path, rows[0]))
         with precision(digits):
-            motion = move(tree, read_exact(robot.urdf, tree, path), q, v, a)
+            motion = compute_motion(tree, read_exact_joints(robot.urdf, tree, path), q, v, a)
             for row in QUANTITIES:
                 for reference in row.references:
                     yield _entry(row, motion, link, reference, frame, row.bound(plan, size, reference))
@@ -406,7 +413,7 @@ def _results(
 def _entry(
     row: Quantity, motion: Any, link: int, reference: Reference | None, frame: str, bound: Any
 ) -> dict[str, Any]:
-    values = row.truth(motion, link, reference)
+    values = row.enclose(motion, link, reference)
     k = float(bound.k.reshape(-1)[0])
     scale = np.broadcast_to(bound.scale[0, 0], values.shape).reshape(-1).tolist()
     return {
@@ -415,6 +422,8 @@ def _entry(
         "reference": None if reference is None else reference.name.lower(),
         "shape": list(values.shape),
         "k": round(k, 6),
-        "value": [decimal(x, k * EPS * s) for x, s in zip(values.reshape(-1).tolist(), scale, strict=True)],
+        "value": [
+            format_decimal(x, k * EPS * s) for x, s in zip(values.reshape(-1).tolist(), scale, strict=True)
+        ],
         "tolerance": [_tolerance(k, s) for s in scale],
     }

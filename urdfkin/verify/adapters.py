@@ -37,7 +37,7 @@ from typing import Any
 import numpy as np
 
 #: Value of a joint; several numbers for a planar or floating joint.
-Value = Any
+JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the three joints that replace a planar joint in MuJoCo.
@@ -45,7 +45,7 @@ _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 
 
 @dataclass(frozen=True)
-class Reading:
+class LibraryModel:
     """A robot that a library has read from a file.
 
     `joints` lists the joints with a coordinate, in the library's order. `poses` returns the pose (4, 4) of
@@ -53,9 +53,9 @@ class Reading:
     """
 
     joints: list[str]
-    poses: Callable[[Mapping[str, Value]], Poses]
+    poses: Callable[[Mapping[str, JointValue]], Poses]
 
-    def unset(self, values: Mapping[str, Value]) -> list[str]:
+    def find_missing_joints(self, values: Mapping[str, JointValue]) -> list[str]:
         return [name for name in values if name not in self.joints]
 
 
@@ -64,13 +64,13 @@ def _is_path(source: str) -> bool:
     return not source.lstrip().startswith("<")
 
 
-def _root(text: str) -> str:
+def _find_root(text: str) -> str:
     robot = ET.fromstring(text)
     children = {child.get("link") for child in robot.iterfind("joint/child")}
     return next(name for link in robot.iterfind("link") if (name := link.get("name", "")) not in children)
 
 
-def _children(text: str) -> dict[str, str]:
+def _find_child_links(text: str) -> dict[str, str]:
     return {
         joint.get("name", ""): child.get("link", "")
         for joint in ET.fromstring(text).iterfind("joint")
@@ -79,41 +79,41 @@ def _children(text: str) -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def _file(text: str) -> Any:
+def _write_temporary_file(text: str) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "robot.urdf")
         path.write_text(text, "utf-8")
         yield str(path)
 
 
-def _scalar(value: Value) -> float:
+def _as_scalar(value: JointValue) -> float:
     if np.ndim(value):
         raise TypeError("the library does not support joints with several coordinates")
     return float(value)
 
 
-def _rigid(R: Any, p: Any) -> Any:
+def _make_pose(R: Any, p: Any) -> Any:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = np.reshape(R, (3, 3)), p
     return T
 
 
-def _relative(poses: Poses, root: str) -> Poses:
+def _make_relative(poses: Poses, root: str) -> Poses:
     """Convert link poses from the world to the root; a missing root pose is the identity."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
-def read_pinocchio(text: str) -> Reading:
+def read_pinocchio(text: str) -> LibraryModel:
     import pinocchio as pin
 
     if _is_path(text):
         model, root = pin.buildModelFromMJCF(text), "universe"
     else:
-        model, root = pin.buildModelFromXML(text, mimic=True), _root(text)
+        model, root = pin.buildModelFromXML(text, mimic=True), _find_root(text)
     data = model.createData()
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         q = pin.neutral(model)
         for name, value in values.items():
             if not model.existJointName(name):
@@ -128,21 +128,21 @@ def read_pinocchio(text: str) -> Reading:
             elif joint.nq:
                 q[at : at + joint.nq] = value
         pin.framesForwardKinematics(model, data, q)
-        return _relative(
+        return _make_relative(
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
     # In Pinocchio, joint 0 is the world.
     moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
-    return Reading(moving, poses)
+    return LibraryModel(moving, poses)
 
 
-def read_mujoco(text: str) -> Reading:
+def read_mujoco(text: str) -> LibraryModel:
     import mujoco
 
     root = "world"
     if not _is_path(text):
-        root, robot = _root(text), ET.fromstring(text)
+        root, robot = _find_root(text), ET.fromstring(text)
         options = {
             "fusestatic": "false",
             "boundmass": "0.001",
@@ -158,26 +158,26 @@ def read_mujoco(text: str) -> Reading:
     data = mujoco.MjData(model)
     names = [model.joint(i).name for i in range(model.njnt)]
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         data.qpos[:] = model.qpos0
-        given = {own: x for name, value in values.items() for own, x in _mujocos(name, value, names)}
+        given = {own: x for name, value in values.items() for own, x in _mujoco_values(name, value, names)}
         for name, value in given.items():
             at = model.jnt_qposadr[names.index(name)]
             if model.jnt_type[names.index(name)] == mujoco.mjtJoint.mjJNT_FREE:
                 data.qpos[at : at + 7] = np.r_[value[:3], value[6], value[3:6]]
             else:
-                data.qpos[at] = _scalar(value)
+                data.qpos[at] = _as_scalar(value)
         mujoco.mj_kinematics(model, data)
-        return _relative(
-            {model.body(i).name: _rigid(data.xmat[i], data.xpos[i]) for i in range(model.nbody)}, root
+        return _make_relative(
+            {model.body(i).name: _make_pose(data.xmat[i], data.xpos[i]) for i in range(model.nbody)}, root
         )
 
     planar = {name.removesuffix(_MUJOCO_PLANAR[0]) for name in names if name.endswith(_MUJOCO_PLANAR[0])}
     found = [name for name in names if name[: -len(_MUJOCO_PLANAR[0])] not in planar]
-    return Reading([*found, *sorted(planar)], poses)
+    return LibraryModel([*found, *sorted(planar)], poses)
 
 
-def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
+def _mujoco_values(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
     """Yield the name and value of each MuJoCo joint that replaces a URDF joint."""
     if name in names:
         yield name, value
@@ -185,24 +185,26 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
         yield from zip((name + suffix for suffix in _MUJOCO_PLANAR), value, strict=True)
 
 
-def read_drake(text: str) -> Reading:
+def read_drake(text: str) -> LibraryModel:
     """Read a URDF with Drake; mimic joints require a discrete plant with the contact solver SAP."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
-    root, plant = _root(text), MultibodyPlant(0.001)
+    root, plant = _find_root(text), MultibodyPlant(0.001)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     Parser(plant).AddModelsFromString(text, "urdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
     # A floating joint has the name of its child link in Drake.
-    carried = {child: joint for joint, child in _children(text).items()}
+    joint_of_child = {child: joint for joint, child in _find_child_links(text).items()}
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
-    joints = {carried.get(j.name(), j.name()): j for j in moving}
-    bodies = [plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_name(text)))]
+    joints = {joint_of_child.get(j.name(), j.name()): j for j in moving}
+    bodies = [
+        plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_find_robot_name(text)))
+    ]
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         q = plant.GetPositions(context).copy()
         for name, value in values.items():
             if name in joints:
@@ -212,77 +214,77 @@ def read_drake(text: str) -> Reading:
         plant.SetPositions(context, q)
         return {b.name(): plant.EvalBodyPoseInWorld(context, b).GetAsMatrix4() for b in bodies}
 
-    return Reading(list(joints), poses)
+    return LibraryModel(list(joints), poses)
 
 
-def _name(text: str) -> str:
+def _find_robot_name(text: str) -> str:
     return ET.fromstring(text).get("name", "")
 
 
-def read_idyntree(text: str) -> Reading:
+def read_idyntree(text: str) -> LibraryModel:
     import idyntree.bindings as idt
 
-    root, loader, computed = _root(text), idt.ModelLoader(), idt.KinDynComputations()
-    if not loader.loadModelFromString(text) or not computed.loadRobotModel(loader.model()):
+    root, loader, kin_dyn = _find_root(text), idt.ModelLoader(), idt.KinDynComputations()
+    if not loader.loadModelFromString(text) or not kin_dyn.loadRobotModel(loader.model()):
         raise ValueError("the model loader returns False")
     model = loader.model()
-    places = {
+    q_slots = {
         model.getJointName(i): model.getJoint(i).getPosCoordsOffset()
         for i in range(model.getNrOfJoints())
         if model.getJoint(i).getNrOfPosCoords()
     }
-    computed.setFloatingBase(root)
+    kin_dyn.setFloatingBase(root)
 
     # The model is deleted together with its loader, so the argument `_loader` keeps the loader alive.
-    def poses(values: Mapping[str, Value], _loader: Any = loader) -> Poses:
+    def poses(values: Mapping[str, JointValue], _loader: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
-        for name in places.keys() & values.keys():
-            q[places[name]] = _scalar(values[name])
-        if not computed.setJointPos(idt.VectorDynSize(q)):
+        for name in q_slots.keys() & values.keys():
+            q[q_slots[name]] = _as_scalar(values[name])
+        if not kin_dyn.setJointPos(idt.VectorDynSize(q)):
             raise ValueError("the joint positions are refused")
         links = [model.getLinkName(i) for i in range(model.getNrOfLinks())]
-        relative = computed.getRelativeTransform
+        relative = kin_dyn.getRelativeTransform
         return {link: relative(root, link).asHomogeneousTransform().toNumPy() for link in links}
 
-    return Reading(sorted(places, key=places.__getitem__), poses)
+    return LibraryModel(sorted(q_slots, key=q_slots.__getitem__), poses)
 
 
-def read_yourdfpy(text: str) -> Reading:
+def read_yourdfpy(text: str) -> LibraryModel:
     import yourdfpy
 
     logging.getLogger("yourdfpy.urdf").disabled = True
     model = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
     root = model.base_link
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         model.update_cfg({name: values[name] for name in model.actuated_joint_names if name in values})
         return {link: model.get_transform(link, root) for link in model.link_map}
 
-    return Reading(list(model.actuated_joint_names), poses)
+    return LibraryModel(list(model.actuated_joint_names), poses)
 
 
-def read_urchin(text: str) -> Reading:
+def read_urchin(text: str) -> LibraryModel:
     import urchin
 
-    with _file(text) as path:
+    with _write_temporary_file(text) as path:
         model = urchin.URDF.load(path, lazy_load_meshes=True)
     names = [joint.name for joint in model.actuated_joints]
 
-    def poses(values: Mapping[str, Value]) -> Poses:
-        own = {name: _urchins(model.joint_map[name], values[name]) for name in names if name in values}
+    def poses(values: Mapping[str, JointValue]) -> Poses:
+        own = {name: _urchin_value(model.joint_map[name], values[name]) for name in names if name in values}
         return dict(model.link_fk(cfg=own, use_names=True))
 
-    return Reading(names, poses)
+    return LibraryModel(names, poses)
 
 
-def _urchins(joint: Any, value: Value) -> Value:
+def _urchin_value(joint: Any, value: JointValue) -> JointValue:
     """Convert a joint value to urchin's form: a 4 by 4 matrix for a floating joint."""
     if joint.joint_type != "floating":
         return value
-    return _rigid(_rotation(value[3:]), value[:3])
+    return _make_pose(_rotation_from_quaternion(value[3:]), value[:3])
 
 
-def _rotation(quaternion: Value) -> Value:
+def _rotation_from_quaternion(quaternion: JointValue) -> JointValue:
     """Return the rotation matrix of a unit quaternion x, y, z, w."""
     x, y, z, w = quaternion
     return [
@@ -292,71 +294,73 @@ def _rotation(quaternion: Value) -> Value:
     ]
 
 
-def read_kinpy(text: str) -> Reading:
+def read_kinpy(text: str) -> LibraryModel:
     import kinpy
 
     chain = kinpy.build_chain_from_urdf(text.encode())
     names = list(chain.get_joint_parameter_names())
 
-    def poses(values: Mapping[str, Value]) -> Poses:
-        found = chain.forward_kinematics({name: _scalar(values.get(name, 0.0)) for name in names})
-        return _relative({link: pose.matrix() for link, pose in found.items()}, _root(text))
+    def poses(values: Mapping[str, JointValue]) -> Poses:
+        found = chain.forward_kinematics({name: _as_scalar(values.get(name, 0.0)) for name in names})
+        return _make_relative({link: pose.matrix() for link, pose in found.items()}, _find_root(text))
 
-    return Reading(names, poses)
+    return LibraryModel(names, poses)
 
 
-def read_ikpy(text: str) -> Reading:
+def read_ikpy(text: str) -> LibraryModel:
     """Read one path of a URDF from the root to a tip, because ikpy does not support branches."""
     from ikpy.chain import Chain
 
-    root, children = _root(text), _children(text)
-    with _file(text) as path, warnings.catch_warnings():
+    root, children = _find_root(text), _find_child_links(text)
+    with _write_temporary_file(text) as path, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         chain = Chain.from_urdf_file(path, base_elements=[root])
 
-    def poses(values: Mapping[str, Value]) -> Poses:
-        q = [_scalar(values.get(link.name, 0.0)) for link in chain.links]
+    def poses(values: Mapping[str, JointValue]) -> Poses:
+        q = [_as_scalar(values.get(link.name, 0.0)) for link in chain.links]
         found = chain.forward_kinematics(q, full_kinematics=True)
         names = [children.get(link.name, root) for link in chain.links]
         return dict(zip(names, found, strict=True))
 
     moving = [link.name for link in chain.links if link.name in children and link.joint_type != "fixed"]
-    return Reading(moving, poses)
+    return LibraryModel(moving, poses)
 
 
-def read_roboticstoolbox(text: str) -> Reading:
+def read_roboticstoolbox(text: str) -> LibraryModel:
     import roboticstoolbox as rtb
 
-    joints = {child: joint for joint, child in _children(text).items()}
-    with _file(text) as path:
+    joints = {child: joint for joint, child in _find_child_links(text).items()}
+    with _write_temporary_file(text) as path:
         robot = rtb.Robot.URDF(path, gripper=None)
     moving = {joints[link.name]: link.jindex for link in robot.links if link.isjoint}
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         q = np.zeros(robot.n)
         for name in moving.keys() & values.keys():
-            q[moving[name]] = _scalar(values[name])
+            q[moving[name]] = _as_scalar(values[name])
         return {link.name: robot.fkine(q, end=link.name).A for link in robot.links}
 
-    return Reading(sorted(moving, key=moving.__getitem__), poses)
+    return LibraryModel(sorted(moving, key=moving.__getitem__), poses)
 
 
-def read_skrobot(text: str) -> Reading:
+def read_skrobot(text: str) -> LibraryModel:
     from skrobot.models.urdf import RobotModelFromURDF
 
-    with _file(text) as path:
+    with _write_temporary_file(text) as path:
         robot = RobotModelFromURDF(urdf_file=path)
     joints = {joint.name: joint for joint in robot.joint_list}
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         for name in joints.keys() & values.keys():
-            joints[name].joint_angle(_scalar(values[name]))
-        return _relative({link.name: link.worldcoords().T() for link in robot.link_list}, _root(text))
+            joints[name].joint_angle(_as_scalar(values[name]))
+        return _make_relative(
+            {link.name: link.worldcoords().T() for link in robot.link_list}, _find_root(text)
+        )
 
-    return Reading(list(joints), poses)
+    return LibraryModel(list(joints), poses)
 
 
-def read_newton(path: str) -> Reading:
+def read_newton(path: str) -> LibraryModel:
     import newton
 
     builder = newton.ModelBuilder()
@@ -365,7 +369,7 @@ def read_newton(path: str) -> Reading:
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
     # If a body has no joint, Newton adds a free joint, which is not in the file.
-    places = {
+    q_slots = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, mimicked_joint, start, count in zip(
             builder.joint_label, builder.joint_type, builder.joint_mimic_joint, starts, counts, strict=False
@@ -374,37 +378,37 @@ def read_newton(path: str) -> Reading:
     }
     bodies = [str(label).rpartition("/")[2] for label in builder.body_label]
 
-    def poses(values: Mapping[str, Value]) -> Poses:
+    def poses(values: Mapping[str, JointValue]) -> Poses:
         q = model.joint_q.numpy()
-        for name in places.keys() & values.keys():
-            start, count = places[name]
+        for name in q_slots.keys() & values.keys():
+            start, count = q_slots[name]
             q[start : start + count] = values[name]
         state.joint_q.assign(q)
         newton.eval_mimic(model, state)
         newton.eval_fk(model, state.joint_q, state.joint_qd, state)
         rotations = (quaternion / np.linalg.norm(quaternion) for quaternion in state.body_q.numpy()[:, 3:])
         return {
-            name: _rigid(_rotation(rotation), p)
+            name: _make_pose(_rotation_from_quaternion(rotation), p)
             for name, rotation, p in zip(bodies, rotations, state.body_q.numpy()[:, :3], strict=True)
         }
 
-    return Reading(list(places), poses)
+    return LibraryModel(list(q_slots), poses)
 
 
 @dataclass(frozen=True)
 class Library:
     """A library that reads robot files.
 
-    `package` is the name of the package that pip installs. `forms` lists the file formats that `read`
-    accepts. `single` is True if the library computes in single precision.
+    `package` is the name of the package that pip installs. `formats` lists the file formats that `read`
+    accepts. `is_single_precision` is True if the library computes in single precision.
     """
 
     title: str
     package: str
     module: str
-    read: Callable[[str], Reading]
-    forms: tuple[str, ...] = ("urdf",)
-    single: bool = False
+    read: Callable[[str], LibraryModel]
+    formats: tuple[str, ...] = ("urdf",)
+    is_single_precision: bool = False
 
 
 LIBRARIES: dict[str, Library] = {
@@ -420,7 +424,7 @@ LIBRARIES: dict[str, Library] = {
         "Robotics Toolbox", "roboticstoolbox-python", "roboticstoolbox", read_roboticstoolbox
     ),
     "skrobot": Library("scikit-robot", "scikit-robot", "skrobot", read_skrobot),
-    "newton": Library("Newton", "newton", "newton", read_newton, ("usd",), single=True),
+    "newton": Library("Newton", "newton", "newton", read_newton, ("usd",), is_single_precision=True),
 }
 
 
@@ -430,7 +434,7 @@ def version(name: str) -> str | None:
     return None
 
 
-def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
+def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
     """Return the joints and link poses that a library computes, or the library's error message."""
     try:
         reading = LIBRARIES[name].read(case["text"])
@@ -441,14 +445,14 @@ def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
     poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
     return {
         "joints": reading.joints,
-        "unset": reading.unset(case["configurations"][0] if case["configurations"] else {}),
+        "unset": reading.find_missing_joints(case["configurations"][0] if case["configurations"] else {}),
         "poses": poses,
     }
 
 
-def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
+def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
     for case in cases:
-        yield json.dumps({"name": case["name"], "version": version(name), **answer(name, case)})
+        yield json.dumps({"name": case["name"], "version": version(name), **evaluate_case(name, case)})
 
 
 def main() -> None:
@@ -458,7 +462,7 @@ def main() -> None:
     # Texts that the libraries print go to standard error, so that the output contains only results.
     output = os.dup(1)
     os.dup2(2, 1)
-    for line in _lines(sys.argv[1], json.load(sys.stdin)):
+    for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):
         os.write(output, f"{line}\n".encode())
 
 

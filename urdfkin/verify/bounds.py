@@ -5,9 +5,9 @@ Each number of a result is compared with the oracle's number. The result is acce
     k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. Large
-terms may cancel, so that both sums are small. The bound on their rounding errors is still proportional to the
-scale.
+terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
+orders. Large terms may cancel, so that both sums are small. The bound on their rounding errors is still
+proportional to the scale.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
@@ -33,12 +33,12 @@ For each joint, measured differences are below eps * scale, because rounding err
 sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared between small
 and large robots.
 
-*Magnitudes.* `magnitudes` replaces each vector by its length and evaluates the equations 7.58 and 7.127 to
-7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
-result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms differ
-by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this cross
-product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha therefore
-uses w_i instead of w_{i-1}.
+*Magnitudes.* `compute_magnitudes` replaces each vector by its length and evaluates the equations 7.58 and
+7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds
+the result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms
+differ by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this
+cross product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha
+therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ from urdfkin.model.tree import FloatArray
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
-_OF_BASE = 9, 12, 15, 18, 21
+_BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
 #: Number of configurations that the kernel `lengths` processes at once; their data fit into the L1 cache.
-_BLOCK = 64
+_BLOCK_LENGTH = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class Magnitudes:
 
 
 @np.errstate(over="ignore", under="ignore", invalid="ignore")
-def magnitudes(
+def compute_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
     """Return upper bounds on the terms of each frame's position, velocity and acceleration.
@@ -102,7 +102,7 @@ def magnitudes(
     `q` has the shape (n, nq); `v` and `a` have the shape (n, nv) or are None. `base` (1 or n, 24) is the
     state of the moving base. Without v, only `p` and `roundings` are valid.
     """
-    n, lengths = len(q), _lengths(plan)
+    n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
     if v is not None and a is None:
         a = np.zeros((1, plan.nv))
@@ -110,29 +110,31 @@ def magnitudes(
     kernel = preload.get_kernel("lengths", module=KERNELS) if n > 1 and len(inputs) > 2 else None
     if kernel is None:
         begin = time.thread_time()
-        _by_steps(lengths, inputs, out)
+        _fill_without_kernel(lengths, inputs, out)
         if n > 1:
             preload.add_time("lengths", time.thread_time() - begin)
     else:
-        _by_kernel(kernel, lengths, inputs, out)
+        _fill_with_kernel(kernel, lengths, inputs, out)
     is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
     out[5] = joint_roundings(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
-def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
-    states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
+    states = [tuple(_norm(base[at : at + 3]) for at in _BASE_VECTOR_INDICES)]
     for link in lengths.links:
-        states.append((_step if rates else _place)(link, states[link.parent + 1], q, *rates))
+        states.append(
+            (_propagate_state if rates else _propagate_position)(link, states[link.parent + 1], q, *rates)
+        )
     for end in lengths.ends:
-        bounds = (steps.translate_point if rates else _carried_place)(states[end.step + 1], end.length)
+        bounds = (steps.translate_point if rates else _translate_position)(states[end.step + 1], end.length)
         for row, values in zip(out, bounds, strict=False):
             row[:, end.frame] = values
 
 
-def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Fill `out` with the compiled kernel; the results equal those of `_by_steps` bit for bit."""
+def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
+    """Fill `out` with the compiled kernel; the results equal those of `_fill_without_kernel` bit for bit."""
     links = lengths.links
     # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -145,14 +147,14 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
     kernel(
         *lengths.tables,
         *map(np.ascontiguousarray, (q, v, a)),
-        _rows(free),
-        norm(base[:, _OF_BASE[0] :].reshape(-1, len(_OF_BASE), 3)),
-        np.zeros((len(links) + 2, len(_OF_BASE), _BLOCK)),
+        _stack_columns(free),
+        norm(base[:, _BASE_VECTOR_INDICES[0] :].reshape(-1, len(_BASE_VECTOR_INDICES), 3)),
+        np.zeros((len(links) + 2, len(_BASE_VECTOR_INDICES), _BLOCK_LENGTH)),
         out[:5].reshape(-1),
     )
 
 
-def _rows(columns: Sequence[FloatArray]) -> FloatArray:
+def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
     """Return an array with the given columns; a column of length 1 fills all rows."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
@@ -172,7 +174,7 @@ class _MovingJoint(NamedTuple):
     offset: float
 
 
-class _End(NamedTuple):
+class _FrameEnd(NamedTuple):
     """A frame, the last moving joint `step` before the frame, and the path length (m) from joint to frame."""
 
     step: int
@@ -184,11 +186,11 @@ class _Lengths(NamedTuple):
     """Moving joints and frames of a compiled tree, as Python numbers and as arrays."""
 
     links: list[_MovingJoint]
-    ends: list[_End]
+    ends: list[_FrameEnd]
     tables: tuple[NDArray[Any], ...]
 
 
-def _lengths(plan: CompiledTree) -> _Lengths:
+def _get_lengths(plan: CompiledTree) -> _Lengths:
     found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
         lengths, count = magnitude(plan.lengths).tolist(), len(plan.steps)
@@ -199,7 +201,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
             for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
-        ends = [_End(step, frame, length) for (step, frame), length in frames]
+        ends = [_FrameEnd(step, frame, length) for (step, frame), length in frames]
         tables = (
             np.array([link[:4] for link in links], dtype=np.int64).reshape(-1, 4),
             np.array([link[4:] for link in links]).reshape(-1, 3),
@@ -219,36 +221,36 @@ def _norm(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
-def _carried_place(state: LinkBounds, d: Length) -> LinkBounds:
+def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
 #: Number of translations and number of rotations, for a planar and for a floating joint.
-_FREE_PARTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
+_FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
 def _displacement(link: _MovingJoint, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
     if link.kind != JointMotion.PRISMATIC:
-        return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
+        return _norm(q[link.q : link.q + _FREE_JOINT_SIZES[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
-def _place(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
+def _propagate_position(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
     turns = link.kind == JointMotion.REVOLUTE
-    return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
+    return _translate_position(state, link.length if turns else link.length + _displacement(link, q))
 
 
 def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
     """Return the norms of a planar or floating joint's displacement, velocities and accelerations."""
-    at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
+    at, (slides, turns) = link.v, _FREE_JOINT_SIZES[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
     )
     return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _step(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
+def _propagate_state(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
     kind, d, at = link.kind, link.length, link.v
     if kind >= JointMotion.PLANAR:
         displacement, *rates = _free_lengths(link, q, v, a)
@@ -262,7 +264,7 @@ def _step(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> Link
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 #: A scale above the range of doubles becomes inf, and no result is then accepted.
-_BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
+_allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,21 +293,23 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return k if k.shape == leading else np.broadcast_to(k, leading)
 
 
-def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with k = factors * `size.roundings`.
+def make_bound(
+    scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _ALIGNED
+) -> Bound:
+    """Return the bound with k = factors * `magnitudes.roundings`.
 
     The reference frames LOCAL and WORLD need one factor more than `factors`.
     """
     factors += reference is not _ALIGNED
-    k = factors * size.roundings
+    k = factors * magnitudes.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
 
 
-@_BEYOND
-def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
+@_allow_overflow
+def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of urdfkin with MuJoCo.
 
-    `size` contains the upper bounds for a comparison with Pinocchio.
+    `magnitudes` contains the upper bounds for a comparison with Pinocchio.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
     `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
@@ -315,15 +319,15 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding
     errors.
     """
-    p = 2.0 * size.p
-    shared = eq.tangential(size.w, size.vel)
+    p = 2.0 * magnitudes.p
+    shared = eq.tangential(magnitudes.w, magnitudes.vel)
     return Magnitudes(
         p=p,
-        w=size.w,
-        vel=eq.point_velocity(size.vel, size.w, p),
-        alpha=size.alpha,
-        acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
-        roundings=2.0 * (MUJOCO_ROUNDINGS / PINOCCHIO_ROUNDINGS) * size.roundings,
+        w=magnitudes.w,
+        vel=eq.point_velocity(magnitudes.vel, magnitudes.w, p),
+        alpha=magnitudes.alpha,
+        acc=eq.point_acceleration(magnitudes.acc + shared, magnitudes.alpha, magnitudes.w, p),
+        roundings=2.0 * (MUJOCO_ROUNDINGS / PINOCCHIO_ROUNDINGS) * magnitudes.roundings,
     )
 
 
@@ -332,15 +336,15 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint, the
-            rules of both joints count.
+        rule_count: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint,
+            the rules of both joints count.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. If terms in a chain of mimic rules
             cancel each other, their rounding errors do not cancel. The added length of a prismatic mimic
             joint is then positive.
     """
 
     angles: FloatArray
-    rules: int
+    rule_count: int
     lengths: FloatArray
 
 
@@ -381,24 +385,26 @@ def true_value_magnitudes(
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
     """
-    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE)
-    more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
-    return replace(size, roundings=size.roundings + more)
+    magnitudes = compute_magnitudes(
+        replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE
+    )
+    more = errors.angles[:, np.newaxis] + 1.5 * errors.rule_count
+    return replace(magnitudes, roundings=magnitudes.roundings + more)
 
 
-def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
+def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
     The scale of a position is the length of the path. The scale of a rotation is 1, and the scale of the last
     row is 0.
     """
-    scale = np.zeros((*size.p.shape, 4, 4))
+    scale = np.zeros((*magnitudes.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
-    scale[..., :3, 3] = size.p[..., None]
+    scale[..., :3, 3] = magnitudes.p[..., None]
     return scale
 
 
-@_BEYOND
+@_allow_overflow
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
@@ -425,17 +431,17 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     return Bound(scale, bound.k)
 
 
-@_BEYOND
-def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+@_allow_overflow
+def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on velocities [linear; angular], (n, frames, 6)."""
-    linear = size.vel
+    linear = magnitudes.vel
     if reference.at_world:
-        linear = eq.point_velocity(linear, size.w, size.p)
-    return _in_six_rows(linear, size.w)
+        linear = eq.point_velocity(linear, magnitudes.w, magnitudes.p)
+    return _repeat_as_six_rows(linear, magnitudes.w)
 
 
-@_BEYOND
-def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+@_allow_overflow
+def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
     Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel, so the scale
@@ -454,20 +460,22 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     - The bound allows 2 eps for the sums at each joint. This is more than the rounding errors of d_k and of
       the sum of 4 n terms.
     """
-    shared = eq.tangential(size.w, size.vel)
-    linear = size.acc + shared
+    shared = eq.tangential(magnitudes.w, magnitudes.vel)
+    linear = magnitudes.acc + shared
     if reference.at_world:
-        linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
-    return _in_six_rows(linear, size.alpha)
+        linear = eq.point_acceleration(linear + shared, magnitudes.alpha, magnitudes.w, magnitudes.p)
+    return _repeat_as_six_rows(linear, magnitudes.alpha)
 
 
-@_BEYOND
-def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
+@_allow_overflow
+def imu_scale(magnitudes: Magnitudes, gravity: FloatArray) -> FloatArray:
     """Return the scale of the bound on IMU readings, (n, frames, 6), for a gravity vector (3,)."""
-    return _in_six_rows(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
+    return _repeat_as_six_rows(
+        magnitudes.acc + eq.tangential(magnitudes.w, magnitudes.vel) + norm(gravity), magnitudes.w
+    )
 
 
-def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
+def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
     """Return (n, frames, 6, ...) with three rows of `linear` and three rows of `angular`."""
     scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
     rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # `np.moveaxis` is slower.
@@ -475,8 +483,8 @@ def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
     return scale
 
 
-@_BEYOND
-def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+@_allow_overflow
+def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
     A revolute joint's column is [z x d; z]. The scale is the length of the path in the linear rows, and 1 in
@@ -485,12 +493,12 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
     multiplied by |multiplier|, and is added to the scale of the mimicked joint.
     """
     turning, sliding = column_weights(plan)
-    linear, angular = eq.turning_column(turning, size.p[..., None])
-    return _in_six_rows(linear + sliding, angular)
+    linear, angular = eq.turning_column(turning, magnitudes.p[..., None])
+    return _repeat_as_six_rows(linear + sliding, angular)
 
 
-@_BEYOND
-def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+@_allow_overflow
+def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
@@ -498,14 +506,14 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
-    w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
+    w, p, vel = magnitudes.w[..., None], magnitudes.p[..., None], magnitudes.vel[..., None]
     linear, angular = eq.turning_column_rate(turning, eq.axis_rate(w, turning), p, vel)
     linear = linear + eq.axis_rate(w, sliding)
     if reference.own_axes:
         column, axis = eq.turning_column(turning, p)
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
-    return _in_six_rows(linear, angular)
+    return _repeat_as_six_rows(linear, angular)
 
 
 #: In the linear rows, Pinocchio's derivative of Jacobian column i by joint j is a sum of cross products.
@@ -520,8 +528,8 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 }
 
 
-@_BEYOND
-def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
+@_allow_overflow
+def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
@@ -555,12 +563,12 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
         np.add.at(turning, pair, both * np.where(before, near, far))
         np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
         np.add.at(angular, pair, both * (before != reference.own_axes))
-    linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
-    return _in_six_rows(linear, angular)
+    linear = product(turning, magnitudes.p[..., np.newaxis, np.newaxis]) + mixed
+    return _repeat_as_six_rows(linear, angular)
 
 
-@_BEYOND
-def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
+@_allow_overflow
+def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
     The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
@@ -582,14 +590,14 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
-    the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
+    the smallest possible value of s, which is `axis_sine` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
     contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the
     bound covers the 13 eps.
 
-    `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
+    `bound` is the bound of the velocity Jacobian, and `axis_sine` (n, frames) is s of Pinocchio's rotation.
     """
-    s = apart - EPS * size.roundings
+    s = axis_sine - EPS * magnitudes.roundings
     # If s is not larger than its rounding error, the scale is not finite, and no result is accepted.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
@@ -621,7 +629,7 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     return 1.5 * EPS * result_k(bound, leading)
 
 
-def nearest_singularity(plan: CompiledTree) -> float:
+def singularity_margin(plan: CompiledTree) -> float:
     """Return four times the error of a frame's rotation, rad.
 
     At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
@@ -647,7 +655,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     return weights[0], weights[1]
 
 
-def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
+def find_active_entries(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
     """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
 
     The linear rows of a revolute column are z x d. In WORLD, d leads from the joint to the root. Otherwise, d

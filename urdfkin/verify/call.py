@@ -23,10 +23,10 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 T = TypeVar("T")
 
 #: Array types that do not override methods of NumPy's arrays.
-_PLAIN = np.ndarray, np.memmap
+_PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
-class Part(NamedTuple):
+class CallPart(NamedTuple):
     """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
 
     `rates` is an empty tuple for a placement, (v,) for a velocity, and (v, a) for an acceleration. The arrays
@@ -70,9 +70,9 @@ class Call:
             for x, by, name in zip(given, named, "qva", strict=False)
         ]
         self.tree, self.base, self.inputs, self.options = tree, base, inputs, options
-        self.several, self.frames = _frames(frame)
+        self.is_list, self.frames = _parse_frames(frame)
         joints = [(joint.name, joint.nv) for joint in tree.joints if joint.nv] if any(named) else ()
-        self.question = OracleQuery(frame, reference, base, inputs, named, joints)
+        self.query = OracleQuery(frame, reference, base, inputs, named, joints)
         self.reference = Reference.of(reference)
         self.links = tuple(tree.frame_link(name) for name in self.frames)
         self.plan = plan((*self.links, *(tree.frame_link(name) for name in also)))
@@ -105,10 +105,10 @@ class Call:
         return np.ascontiguousarray(np.broadcast_to(array, (*self.shape, width)).reshape(self.n, width))
 
     @property
-    def results(self) -> int:
+    def result_count(self) -> int:
         return self.n * len(self.links)
 
-    def flat(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
+    def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
@@ -117,26 +117,26 @@ class Call:
         """
         if out is None:
             return None
-        wanted = (*self.shape, *((len(self.links),) if self.several else ()), *shape)
-        good = type(out) in _PLAIN and out.dtype == np.float64 and out.flags.carray
+        wanted = (*self.shape, *((len(self.links),) if self.is_list else ()), *shape)
+        good = type(out) in _PLAIN_ARRAY_TYPES and out.dtype == np.float64 and out.flags.carray
         if not good or out.shape != wanted:
             raise InputError(
                 f"out must be a writable C-contiguous float64 array of shape {wanted}",
-                found=_described(out),
+                found=_describe_array(out),
                 remedy="np.asarray(out) is a plain array"
-                if isinstance(out, np.ndarray) and type(out) not in _PLAIN
+                if isinstance(out, np.ndarray) and type(out) not in _PLAIN_ARRAY_TYPES
                 else None,
             )
-        self.question.read()
+        self.query.convert_inputs()
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError(
                 "out must not share memory with q, v or a, because the check reads the inputs again"
             )
         return out.reshape(self.n, len(self.links), *shape)
 
-    def in_shape(self, result: FloatArray) -> FloatArray:
+    def restore_shape(self, result: FloatArray) -> FloatArray:
         """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame adds no axis."""
-        return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
+        return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
         """Call `evaluate`; if an input is not finite, raise an error with the name of the joint."""
@@ -147,18 +147,18 @@ class Call:
                 parse_finite(self.tree, x, name)
             raise
 
-    def part(self, part: slice | IntArray) -> Part:
+    def select(self, part: slice | IntArray) -> CallPart:
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
-        query = self.question.rows(part)
-        return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
+        query = self.query.select(part)
+        return CallPart(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
-    def index(self, k: int) -> tuple[int, ...]:
+    def batch_index(self, k: int) -> tuple[int, ...]:
         """Convert an index in the flat batch to indices in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
-def _described(out: object) -> str:
+def _describe_array(out: object) -> str:
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -170,7 +170,7 @@ def _described(out: object) -> str:
     return ", ".join((f"{type(out).__name__} of {out.dtype} {out.shape}", *faults))
 
 
-def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
+def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     """Return whether `frame` is a list, and the names."""
     if isinstance(frame, str):
         return False, (frame,)

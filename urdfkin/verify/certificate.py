@@ -21,7 +21,7 @@ from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
-CHECK_TURNED_OFF = "the check was turned off by verify=False"
+CHECK_DISABLED = "the check was turned off by verify=False"
 _ledger_lock = make_fork_safe_lock()
 
 
@@ -80,14 +80,14 @@ class CertificateLine:
         checked: Number of results that the oracle confirmed.
         worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
             scale.
-        share: Largest ratio of a difference to its bound.
+        share_of_bound: Largest ratio of a difference to its bound.
         unchecked: Number of results that were not checked.
     """
 
     quantity: str
     checked: int
     worst: float
-    share: float
+    share_of_bound: float
     unchecked: int
 
 
@@ -100,7 +100,7 @@ class LineEntry(TypedDict):
         Size | None,
         doc("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
     ]
-    share: Annotated[
+    share_of_bound: Annotated[
         Size | None, doc("Largest ratio of a difference to its bound; null: the ratio is not finite.")
     ]
     unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
@@ -111,7 +111,7 @@ class CertificateDocument(Header):
 
     robot: Annotated[str, doc("The robot's name.")]
     source: Annotated[str, doc("Source of the robot: a path, a catalogue name, or <text>.")]
-    reading: Annotated[
+    source_notes: Annotated[
         str, doc("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
     ]
     oracle: Annotated[str, doc("Name and version of the oracle.")]
@@ -138,7 +138,7 @@ class Certificate(Displayable):
         oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
         lines: One line for each computed quantity.
         not_verified: Reasons why results were not checked; empty if all were checked.
-        reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
+        source_notes: Result of the check of the conversion to URDF from another format; empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: SHA-256 digest of the MJCF or USD file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.
@@ -154,7 +154,7 @@ class Certificate(Displayable):
     oracle: str
     lines: tuple[CertificateLine, ...]
     not_verified: tuple[str, ...]
-    reading: str = ""
+    source_notes: str = ""
     source: str = ""
     sha256: str = ""
     urdfkin: str = ""
@@ -170,7 +170,7 @@ class Certificate(Displayable):
         True
         """
         return any(line.checked for line in self.lines) and not any(
-            line.unchecked or not line.share <= 1.0 for line in self.lines
+            line.unchecked or not line.share_of_bound <= 1.0 for line in self.lines
         )
 
     def as_dict(self) -> CertificateDocument:
@@ -188,7 +188,7 @@ class Certificate(Displayable):
             "sha256": [self.sha256 or None],
             "verdict": CERTIFICATE.verdicts[not self.verified],
             "command": None,
-            **{name: getattr(self, name) for name in ("robot", "source", "reading", "oracle")},
+            **{name: getattr(self, name) for name in ("robot", "source", "source_notes", "oracle")},
             "lines": self.lines,
             "not_verified": self.not_verified,
         }
@@ -216,14 +216,14 @@ class Certificate(Displayable):
     def _text_document(self) -> TextDocument:
         heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")
         rows = [
-            (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share:.1%}")
+            (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share_of_bound:.1%}")
             for x in self.lines
         ]
         word = "verified" if self.verified else "NOT verified"
         parts: list[str | Table] = [
             Table(heads, rows),
             *(f"Not verified: {reason}." for reason in self.not_verified),
-            *([f"Read: {self.reading}."] if self.reading else []),
+            *([f"Read: {self.source_notes}."] if self.source_notes else []),
         ]
         if self.sha256:
             parts.append(f"Computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256}).")
@@ -235,11 +235,11 @@ class Certificate(Displayable):
             head += f", computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})"
         rows = [head] + [
             f"  {line.quantity}: {line.checked} checked, worst {line.worst:.2g} eps*scale"
-            f" ({line.share:.1%} of the bound)"
+            f" ({line.share_of_bound:.1%} of the bound)"
             + (f", {line.unchecked} not checked" if line.unchecked else "")
             for line in self.lines
         ]
-        rows += [f"  read: {self.reading}"] if self.reading else []
+        rows += [f"  read: {self.source_notes}"] if self.source_notes else []
         rows += [f"  not verified: {reason}" for reason in self.not_verified]
         return "\n".join(map(log_line, rows))
 
@@ -250,23 +250,23 @@ class Account:
 
     Attributes:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
-        turned_off: Number of results of calls with verify=False.
+        disabled_checks: Number of results of calls with verify=False.
         counters: A pair (array, index) for each compiled function that computes results without checks.
             The function counts its results in array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
     unchecked: int = 0
-    turned_off: int = 0
+    disabled_checks: int = 0
     counters: list[tuple[IntArray, int]] = field(default_factory=list)
 
     def line(self, quantity: str) -> CertificateLine:
         found = self.checked
-        unchecked = self.unchecked + self.turned_off_in_all()
-        return CertificateLine(quantity, found.results, found.worst, found.share, unchecked)
+        unchecked = self.unchecked + self.count_disabled_checks()
+        return CertificateLine(quantity, found.result_count, found.worst, found.share_of_bound, unchecked)
 
-    def turned_off_in_all(self) -> int:
-        return self.turned_off + sum(int(counts[index]) for counts, index in self.counters)
+    def count_disabled_checks(self) -> int:
+        return self.disabled_checks + sum(int(counts[index]) for counts, index in self.counters)
 
 
 @dataclass
@@ -282,17 +282,17 @@ class Ledger:
         with _ledger_lock:
             return self._accounts.setdefault(quantity, Account())
 
-    def checked(self, quantity: str, comparison: BatchComparison) -> None:
+    def count_checked(self, quantity: str, comparison: BatchComparison) -> None:
         account = self.account(quantity)
         with _ledger_lock:
             account.checked += comparison
 
-    def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
+    def count_unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
         """Count results that were not checked; `reason` is None for calls with verify=False."""
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:
-                account.turned_off += results
+                account.disabled_checks += results
             else:
                 account.unchecked += results
                 self._reasons[reason] = None
@@ -300,8 +300,8 @@ class Ledger:
     def certificate(self, robot: str, oracle: str) -> Certificate:
         with _ledger_lock:
             accounts = {name: self._accounts[name] for name in QUANTITIES if name in self._accounts}
-            off = any(account.turned_off_in_all() for account in accounts.values())
-            reasons = (*([CHECK_TURNED_OFF] if off else []), *self._reasons)
+            off = any(account.count_disabled_checks() for account in accounts.values())
+            reasons = (*([CHECK_DISABLED] if off else []), *self._reasons)
             lines = [account.line(name) for name, account in accounts.items()]
             return Certificate(
                 robot, oracle, tuple(line for line in lines if line.checked or line.unchecked), reasons

@@ -19,7 +19,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import KERNELS, Bound, result_k
 
 #: Names of the kernels that check a single configuration.
-CHECKS = "worst", "coupling"
+CHECK_KERNELS = "worst", "coupling"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
 
@@ -29,13 +29,13 @@ class BatchComparison:
 
     Attributes:
         worst: Largest difference of two numbers, in multiples of eps * scale.
-        share: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
+        share_of_bound: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
         index: Index in each batch axis of the result with the largest ratio.
     """
 
-    results: int = 0
+    result_count: int = 0
     worst: float = 0.0
-    share: float = 0.0
+    share_of_bound: float = 0.0
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
@@ -43,25 +43,27 @@ class BatchComparison:
 
         `index` comes from the batch with the larger `share`. NaN counts as larger than any number.
         """
-        second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
+        second_is_larger = other.share_of_bound > self.share_of_bound or (
+            np.isnan(other.share_of_bound) and not np.isnan(self.share_of_bound)
+        )
         first, second = (other, self) if second_is_larger else (self, other)
         return BatchComparison(
-            self.results + other.results,
+            self.result_count + other.result_count,
             float(np.maximum(self.worst, other.worst)),
-            first.share,
+            first.share_of_bound,
             first.index or second.index,
         )
 
     @property
     def agrees(self) -> bool:
-        return self.share <= 1.0
+        return self.share_of_bound <= 1.0
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
+    return compare_units(worst_disagreements(ours, theirs, bound.scale, axes), bound)
 
 
-def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
+def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
     """Compare the difference of each result with the bound of the result.
 
     `units` contains one difference for each result, in multiples of eps * scale.
@@ -86,7 +88,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
     return np.where(np.isfinite(difference) & np.isfinite(scale), units, np.inf)
 
 
-def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
+def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
     """Return the largest `disagreement` of each result, as an array of shape `ours.shape[:axes]`.
 
     For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be
@@ -96,8 +98,8 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     n, numbers = math.prod(leading), math.prod(own)
     shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
     shape = (1, *ours.shape[1:]) if shared else ours.shape
-    one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
-    size = _rows(scale, shape, math.prod(shape[:axes]), numbers)
+    one, other = _as_rows(ours, ours.shape, n, numbers), _as_rows(theirs, ours.shape, n, numbers)
+    size = _as_rows(scale, shape, math.prod(shape[:axes]), numbers)
     if (kernel := preload.get_kernel("worst", module=KERNELS)) is None:
         begin = time.thread_time()
         scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
@@ -114,7 +116,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     return worst.reshape(leading)
 
 
-def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
+def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
     if x.shape != shape:  # `broadcast_to` is slow.
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
@@ -123,5 +125,5 @@ def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatA
 def load_kernels() -> None:
     """Compile or load all Numba kernels, so that worker processes do not compile them."""
     preload.load_all_kernels()
-    for name in (*CHECKS, "lengths"):
+    for name in (*CHECK_KERNELS, "lengths"):
         preload.load_kernel(name, KERNELS)

@@ -43,17 +43,17 @@ from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointFrame, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import ConvertedModel
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import Bound, compute_magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.comparison import compare
 from urdfkin.verify.oracle import QueryBatch
-from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
+from urdfkin.verify.pinocchio import MAX_NV, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 #: Number of random configurations besides the zero configuration.
-_SAMPLES = 8
+_SAMPLE_COUNT = 8
 #: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
 #: The error of each program is less than 8 eps.
 #: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
@@ -73,7 +73,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     all joints on both paths of Pinocchio. The length in the bound is the distance of the first frame from the
     root plus the length of the chain, with prismatic displacements.
     """
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
     tree = verifier.tree
     names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
@@ -109,9 +109,9 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: OpwParameters) -> str | None:
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
-    q, base, tip = _sampled_ends(verifier, path.base, path.tip)
+    q, base, tip = _sample_base_and_tip(verifier, path.base, path.tip)
     values = path.coupling.values(path.coupling.select(verifier.tree, q))
     off = np.abs(base @ found.placement(values) - tip)[:, :3]
     return (
@@ -121,9 +121,9 @@ def check_opw(verifier: Verifier, path: FrameChain, found: OpwParameters) -> str
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return None
-    q, base, tip = _sampled_ends(verifier, screws.base_frame, screws.tip_frame)
+    q, base, tip = _sample_base_and_tip(verifier, screws.base_frame, screws.tip_frame)
     coordinates = screws.coupling.select(verifier.tree, q)
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
@@ -149,7 +149,9 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     )
 
 
-def _sampled_ends(verifier: Verifier, base: str, tip: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _sample_base_and_tip(
+    verifier: Verifier, base: str, tip: str
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return random configurations, and Pinocchio's placements (n, 4, 4) of base and tip."""
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
@@ -198,30 +200,30 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv.
-        return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
-    q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
+    if model.nv > MAX_NV:  # Pinocchio's memory grows with the cube of nv.
+        return f"not compared with the model itself: nv is {model.nv}, more than {MAX_NV}"
+    q = np.vstack((neutral(tree), sample(tree, _SAMPLE_COUNT, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
-    theirs = _placements(model, _configurations(model, tree, q), made)
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
+    theirs = _model_placements(model, _model_configurations(model, tree, q), made)
     # The factor 2 in the bound allows for the rounded angles in the URDF text.
-    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
+    bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(
             "the robot made from a pinocchio.Model differs from the model",
             where=f"{tree.name}, {names[found.index[1]]}",
-            found=f"{found.share:.3g} times the bound of rounding, Pinocchio {version()}",
+            found=f"{found.share_of_bound:.3g} times the bound of rounding, Pinocchio {version()}",
             remedy="please report this as an error of urdfkin, with the model",
         )
     return (
         f"compared with the model itself: {len(names)} links agree in {len(q)} configurations"
-        f" ({found.share:.1%} of the bound)"
+        f" ({found.share_of_bound:.1%} of the bound)"
     )
 
 
-def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
+def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     """Return the model's placements (n, joints + frames, 4, 4)."""
     pin = pinocchio()
     data = model.createData()
@@ -233,7 +235,7 @@ def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     return out
 
 
-def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
+def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
     """Return configurations (n, model.nq) of the model for the tree's q, with joints matched by name."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -252,14 +254,14 @@ def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArra
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
     """Compare Pinocchio's placements of the tip with the placements from the robot's table."""
-    if verifier.cannot() is not None:
+    if verifier.find_refusal() is not None:
         return
-    q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
+    q = sample(verifier.tree, _SAMPLE_COUNT, np.random.default_rng(0))
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
     # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
-    rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
+    rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
@@ -271,7 +273,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
         )
 
 
-def _defect(table: DHTable) -> float:
+def _orthogonality_defect(table: DHTable) -> float:
     """Return the sum of the Frobenius norms of R^T R - I over the rotations R of base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -23,23 +23,23 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify import bounds
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
-from urdfkin.verify.bounds import Bound, bound_of, imu_scale, magnitudes
-from urdfkin.verify.call import Part
+from urdfkin.verify.bounds import Bound, compute_magnitudes, imu_scale, make_bound
+from urdfkin.verify.call import CallPart
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import OracleLibrary
 
 
 def check_analytical_jacobian(
-    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
+    compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's analytical Jacobians (n, frames, 6 or 7, nv), and the bound on the difference.
 
-    `bound_of` computes the bound of the velocity Jacobian.
+    `compute_bound` computes the bound of the velocity Jacobian.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
-    size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
-    bound = bound_of(x.plan, size, aligned)
+    magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, None, None, x.state))
+    bound = compute_bound(x.plan, magnitudes, aligned)
     representation = str(x.options["representation"])
     if representation == "quaternion":
         quat = oracle.quaternions(x.query)
@@ -52,19 +52,19 @@ def check_analytical_jacobian(
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
     R = oracle.placements(x.query)[..., :3, :3]
-    theirs, apart = euler_jacobian(representation, R, J_v)
-    return theirs, bounds.euler_jacobian_bound(bound, size, apart)
+    theirs, axis_sine = euler_jacobian(representation, R, J_v)
+    return theirs, bounds.euler_jacobian_bound(bound, magnitudes, axis_sine)
 
 
 def check_relative_placement(
-    bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
+    compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's relative placements (n, frames, 4, 4), and the bound on the difference.
 
-    `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b
-    relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and k_a
-    rounding errors; the path to frame b has the length s_b and k_b rounding errors. Errors in multiples of
-    eps:
+    `compute_bound` computes the bound of placements in the world. The relative placement is the pose of frame
+    b relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and
+    k_a rounding errors; the path to frame b has the length s_b and k_b rounding errors. Errors in multiples
+    of eps:
 
     | Number | Source | Error at most |
     |---|---|---|
@@ -84,12 +84,14 @@ def check_relative_placement(
     theirs[..., :3, :] = R_a_world @ T[:, :-1, :3, :]
     theirs[..., :3, 3] -= (R_a_world @ T[:, -1:, :3, 3:])[..., 0]
     theirs[..., 3, 3] = 1.0
-    size = by.size(magnitudes(x.plan, x.q, None, None, x.state))
-    world = bound_of(x.plan, replace(size, p=size.p + size.p[:, -1:]), None)
+    magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, None, None, x.state))
+    world = compute_bound(x.plan, replace(magnitudes, p=magnitudes.p + magnitudes.p[:, -1:]), None)
     return theirs, Bound(world.scale[:, :-1], world.k[:, :-1] + 2.0 * world.k[:, -1:])
 
 
-def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> tuple[FloatArray, Bound]:
+def check_imu(
+    oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
+) -> tuple[FloatArray, Bound]:
     """Return an oracle's IMU readings (n, frames, 6), and the bound on the difference."""
     local, (v, a) = Reference.LOCAL, x.rates
     query = x.query._replace(reference=local)
@@ -97,6 +99,6 @@ def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> t
     R = oracle.placements(query)[..., :3, :3]
     proper_acceleration = oracle.accelerations(query)[..., :3] - gravity @ R  # `gravity @ R` equals R^T g.
     w = oracle.velocities(query)[..., 3:]
-    size = by.size(magnitudes(x.plan, x.q, v, a, x.state))
-    bound = bound_of(imu_scale(size, gravity), 3, size, local)
+    magnitudes = library.adapt_magnitudes(compute_magnitudes(x.plan, x.q, v, a, x.state))
+    bound = make_bound(imu_scale(magnitudes, gravity), 3, magnitudes, local)
     return np.concatenate((proper_acceleration, w), axis=-1), bound

@@ -30,14 +30,14 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bind_equations, rebind_functions
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
 
-_INFINITE = 0x7FF0000000000000
-_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
+_INFINITY_BITS = 0x7FF0000000000000
+_MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
 #: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
-_AHEAD = 4
+_PREFETCH_DISTANCE = 4
 
 
 @inline_function(fastmath={"reassoc"})
-def _finite(x, i):
+def _is_finite(x, i):
     # If a number is inf or NaN, the product of 0 and this number is NaN.
     total = 0.0
     for j in range(x.shape[1]):
@@ -46,7 +46,7 @@ def _finite(x, i):
 
 
 @inline_function(fastmath={"reassoc"})
-def _finite_difference(x, y, i):
+def _is_difference_finite(x, y, i):
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * (x[i, j] - y[i, j])
@@ -54,22 +54,22 @@ def _finite_difference(x, y, i):
 
 
 @inline_function(fastmath={"nnan", "nsz"})
-def _units(difference, size):
+def _in_eps_scale(difference, size):
     must_be_equal = math.inf if difference > 0.0 else 0.0
     return difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
 
 
 @inline_function(fastmath={"nnan", "nsz"})
-def _largest(ours, theirs, scale, i, k):
+def _largest_difference(ours, theirs, scale, i, k):
     """Return the largest difference in row `i`, in units of eps * `scale[k]`, for finite numbers."""
     largest = 0.0
     for j in range(ours.shape[1]):
-        largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
+        largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
     return largest
 
 
 @inline_function()
-def _is_in_threes(scale, k):
+def _has_equal_triples(scale, k):
     """Return whether the three linear rows of `scale[k]` are equal, and the three angular rows are equal."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
@@ -80,7 +80,7 @@ def _is_in_threes(scale, k):
 
 
 @inline_function()
-def _divide_threes(ours, theirs, unit, width, units):
+def _divide_triples(ours, theirs, unit, width, units):
     """For each column of three rows, write the largest difference between `ours` and `theirs` to `units`.
 
     The three rows have the same scale. The differences are divided by `unit`, which is eps * scale; a
@@ -97,7 +97,7 @@ def _divide_threes(ours, theirs, unit, width, units):
 
 
 @inline_function()
-def _most(x, count):
+def _largest_bits(x, count):
     """Return the bit pattern of the largest of several numbers, which are non-negative, inf or NaN.
 
     Bit patterns of non-negative doubles, compared as integers, have the same order as the doubles. The sign
@@ -105,7 +105,7 @@ def _most(x, count):
     """
     most = 0
     for j in range(count):
-        most = max(most, x[j] & _WITHOUT_SIGN)
+        most = max(most, x[j] & _MASK_WITHOUT_SIGN)
     return most
 
 
@@ -127,30 +127,30 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     of `out` and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum
     of doubles.
     """
-    known = in_threes = len(scale) < len(out)
+    known = in_triples = len(scale) < len(out)
     for k in range(len(scale)):
-        known = known and _finite(scale, k)
-        in_threes = in_threes and _is_in_threes(scale, k)
-    in_threes = in_threes and known
+        known = known and _is_finite(scale, k)
+        in_triples = in_triples and _has_equal_triples(scale, k)
+    in_triples = in_triples and known
     width, address = ours.shape[1] // 6, doubles_at(ours.ctypes.data)
     numbers = 6 * width
-    if in_threes:
+    if in_triples:
         for k in range(len(scale)):
             for j in range(numbers):
                 size = scale[k, j]
                 unit[k * numbers + j] = max(EPS * size, LEAST_UNIT) if size > 0.0 else 0.0
     for i in range(len(out)):
         k = i % len(scale)
-        if in_threes:
-            prefetch(address, min(i + _AHEAD, len(out) - 1) * numbers, numbers)
+        if in_triples:
+            prefetch(address, min(i + _PREFETCH_DISTANCE, len(out) - 1) * numbers, numbers)
             for first in (0, 3 * width):
                 rows, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
-                _divide_threes(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
-            out_bits[i] = min(_most(bits, 2 * width), _INFINITE)
-        elif not (_finite_difference(ours, theirs, i) and (known or _finite(scale, k))):
+                _divide_triples(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
+            out_bits[i] = min(_largest_bits(bits, 2 * width), _INFINITY_BITS)
+        elif not (_is_difference_finite(ours, theirs, i) and (known or _is_finite(scale, k))):
             out[i] = math.inf
         else:
-            out[i] = _largest(ours, theirs, scale, i, k)
+            out[i] = _largest_difference(ours, theirs, scale, i, k)
     return 0
 
 
@@ -169,7 +169,7 @@ def coupling(full, columns, index, factor, out):
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
 #: Number of bounds (p, w, vel, alpha, acc) for each link.
 #: `free` contains the same number of lengths for each planar or floating joint.
-_STATE = _FREE = 5
+_STATE_SIZE = _FREE_SIZE = 5
 
 
 @inline_function()
@@ -184,14 +184,14 @@ def _product(x, y):
 
 
 @inline_function()
-def _unturned(R, x):
+def _ignore_rotation(R, x):
     return x
 
 
 _LENGTHS = {
     "plus": _sum,
     "minus": _sum,
-    "rotate": _unturned,
+    "rotate": _ignore_rotation,
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
 # Numba can call functions that are attributes of a module.
@@ -204,22 +204,22 @@ _translate_point, _after_revolute, _after_prismatic, _after_free_joint = (
 
 
 @inline_function()
-def _state(x, i):
+def _read_state(x, i):
     return x[0, i], x[1, i], x[2, i], x[3, i], x[4, i]
 
 
 @inline_function()
-def _put(x, i, state):
+def _write_state(x, i, state):
     x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] = state
 
 
 @inline_function()
-def _of_row(x, row, at):
+def _read_row(x, row, at):
     return x[row, at], x[row, at + 1], x[row, at + 2], x[row, at + 3], x[row, at + 4]
 
 
 @inline_function()
-def _read(x, first, m, at, factor, to):
+def _write_scaled(x, first, m, at, factor, to):
     """Write factor * |x[k, at]| to `to`, for the m rows k = first, first + 1, and so on.
 
     If `x` has only one row, this row is used m times.
@@ -230,24 +230,26 @@ def _read(x, first, m, at, factor, to):
 
 
 @inline_function()
-def _over_turn(before, after, m, d, rates):
+def _propagate_over_revolute(before, after, m, d, rates):
     for i in range(m):
-        _put(after, i, _after_revolute(_state(before, i), d, rates[0, i], rates[1, i]))
+        _write_state(after, i, _after_revolute(_read_state(before, i), d, rates[0, i], rates[1, i]))
 
 
 @inline_function()
-def _over_slide(before, after, m, d, constant, rates):
+def _propagate_over_prismatic(before, after, m, d, constant, rates):
     for i in range(m):
         length = d + (rates[2, i] + constant)
-        _put(after, i, _after_prismatic(_state(before, i), length, rates[0, i], rates[1, i]))
+        _write_state(after, i, _after_prismatic(_read_state(before, i), length, rates[0, i], rates[1, i]))
 
 
 @inline_function()
-def _over_free(before, after, first, m, d, free, at):
+def _propagate_over_free(before, after, first, m, d, free, at):
     step = 1 if len(free) > 1 else 0
     for i in range(m):
-        displacement, o, u, o_rate, u_rate = _of_row(free, (first + i) * step, at)
-        _put(after, i, _after_free_joint(_state(before, i), d + displacement, o, u, o_rate, u_rate))
+        displacement, o, u, o_rate, u_rate = _read_row(free, (first + i) * step, at)
+        _write_state(
+            after, i, _after_free_joint(_read_state(before, i), d + displacement, o, u, o_rate, u_rate)
+        )
 
 
 @kernel(
@@ -278,32 +280,32 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
       and one additional state
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
-    n = len(out) // max(1, _STATE * frames)
+    n = len(out) // max(1, _STATE_SIZE * frames)
     for first in range(0, n, block):
         m, found = min(block, n - first), 0
         start, step = s[0], 1 if len(base) > 1 else 0
         for i in range(m):
-            _put(start, i, _of_row(base, (first + i) * step, 0))
+            _write_state(start, i, _read_row(base, (first + i) * step, 0))
         for k in range(len(links)):
             kind, at, parent = links[k, 0], links[k, 2], links[k, 3]
             d, multiplier = sizes[k, 0], sizes[k, 1]
             before, after = s[parent + 1], s[k + 1]
             if kind > _SLIDE:
-                _over_free(before, after, first, m, d, free, found)
-                found += _FREE
+                _propagate_over_free(before, after, first, m, d, free, found)
+                found += _FREE_SIZE
             else:
-                _read(v, first, m, at, multiplier, rates[0])
-                _read(a, first, m, at, multiplier, rates[1])
+                _write_scaled(v, first, m, at, multiplier, rates[0])
+                _write_scaled(a, first, m, at, multiplier, rates[1])
                 if kind == _TURN:
-                    _over_turn(before, after, m, d, rates)
+                    _propagate_over_revolute(before, after, m, d, rates)
                 else:
-                    _read(q, first, m, links[k, 1], multiplier, rates[2])
-                    _over_slide(before, after, m, d, sizes[k, 2], rates)
+                    _write_scaled(q, first, m, links[k, 1], multiplier, rates[2])
+                    _propagate_over_prismatic(before, after, m, d, sizes[k, 2], rates)
         for f in range(frames):
             before = s[ends[f, 0] + 1]
             for i in range(m):
                 at = (first + i) * frames + ends[f, 1]
-                state = _translate_point(_state(before, i), tips[f])
-                for j in range(_STATE):
+                state = _translate_point(_read_state(before, i), tips[f])
+                for j in range(_STATE_SIZE):
                     out[j * n * frames + at] = state[j]
     return 0

@@ -30,38 +30,38 @@ from urdfkin.system.files import expand_home
 from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.mjcf import MjcfRemark, is_text, source_name
 from urdfkin.urdf.mujoco import version
-from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
-from urdfkin.verify.comparison import worst_of_each
-from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
+from urdfkin.verify.bounds import Bound, compute_magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
+from urdfkin.verify.comparison import worst_disagreements
+from urdfkin.verify.mjcf_process import MAX_OUTPUT_BYTES, parse_answers, unpack_array
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations besides the zero configuration.
-_SAMPLES = 8
+_SAMPLE_COUNT = 8
 #: Time limit for reading a file, seconds.
-PATIENCE = 60.0
-_QUOTED = 300
+TIMEOUT = 60.0
+_MAX_QUOTE_LENGTH = 300
 
 
 @dataclass(frozen=True, slots=True)
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    `listed` contains elements of the file that the tree does not contain. `not_whole` is the reason why
+    `remarks` contains elements of the file that the tree does not contain. `shapes_refusal` is the reason why
     MuJoCo compiled the file only without shapes and inertias. `pinocchio` is a report about Pinocchio's
     reader.
     """
 
     urdf: str
-    listed: tuple[MjcfRemark, ...]
+    remarks: tuple[MjcfRemark, ...]
     path: str | None
     answer: Mapping[str, Any]
-    not_whole: str | None
+    shapes_refusal: str | None
     pinocchio: Mapping[str, Any] | None
 
 
 def read_mjcf(
-    source: str | bytes | os.PathLike[str], *, check: bool = True, patience: float = PATIENCE
+    source: str | bytes | os.PathLike[str], *, check: bool = True, timeout: float = TIMEOUT
 ) -> MjcfReading:
     """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
@@ -75,63 +75,63 @@ def read_mjcf(
     path = None if text else str(expand_home(os.fspath(source)))  # type: ignore[arg-type]
     request = {
         "path": path,
-        "text": _text(source, name) if text else None,
+        "text": _decode_text(source, name) if text else None,
         "name": name,
-        "samples": _SAMPLES if check else 0,
-        "seconds": ceil(patience) + 1,
+        "samples": _SAMPLE_COUNT if check else 0,
+        "seconds": ceil(timeout) + 1,
     }
-    answers, ending = _ask(request, patience)
-    read = [answer for answer in answers if "urdf" in answer]
-    if not read:
+    answers, ending = _ask_process(request, timeout)
+    reading = [answer for answer in answers if "urdf" in answer]
+    if not reading:
         raise InputError(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
             remedy="check the file for very large numbers, for example in <replicate>",
         )
-    reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
+    reasons = [answer["shapes_refusal"] for answer in answers if "shapes_refusal" in answer]
     return MjcfReading(
-        read[-1]["urdf"],
-        tuple(MjcfRemark(*one) for one in read[-1]["listed"]),
+        reading[-1]["urdf"],
+        tuple(MjcfRemark(*one) for one in reading[-1]["listed"]),
         path,
-        read[-1],
-        None if read[-1]["whole"] else escape_unprintable((reasons or [ending])[0])[:_QUOTED],
+        reading[-1],
+        None if reading[-1]["whole"] else escape_unprintable((reasons or [ending])[0])[:_MAX_QUOTE_LENGTH],
         next((answer["pinocchio"] for answer in answers if "pinocchio" in answer), None),
     )
 
 
-def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
+def _decode_text(source: str | bytes | os.PathLike[str], name: str) -> str:
     try:
         return source.decode("utf-8-sig") if isinstance(source, bytes) else str(source).lstrip("\ufeff")
     except UnicodeDecodeError as error:
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=str(error)) from None
 
 
-def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
+def _ask_process(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[str, Any]], str]:
     command = python_command(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = run_python(command, json.dumps(request).encode(), patience, MOST)
-    return parse_answers(output, status, library="MuJoCo", name=request["name"], patience=patience)
+    output, status = run_python(command, json.dumps(request).encode(), timeout, MAX_OUTPUT_BYTES)
+    return parse_answers(output, status, library="MuJoCo", name=request["name"], timeout=timeout)
 
 
-def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
+def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
 
     Raises OracleError if placements or mimic rules differ by more than the bound. A missing or an additional
     joint equality in MuJoCo's model also raises OracleError.
     """
-    tree, answer = verifier.tree, read.answer
-    q = unpacked(answer["q"])
+    tree, answer = verifier.tree, reading.answer
+    q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     # The factor 2 allows for the rounded angles in the URDF text.
-    size = mujoco_magnitudes(magnitudes(plan, q, None, None, FIXED_BASE_STATE))
-    bound = PLACEMENT.bound(plan, size, None)
+    magnitudes = mujoco_magnitudes(compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE))
+    bound = PLACEMENT.bound(plan, magnitudes, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
-    bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))
-    share = _shares(ours, _placements(answer["placements"]), bound)
+    bound = mjcf_placement_bound(bound, unpack_array(answer["lengths"]), unpack_array(answer["angles"]))
+    share = _compute_bound_shares(ours, _unpack_placements(answer["placements"]), bound)
     if not (share <= 1.0).all():
         k, f = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
         raise _error(
@@ -144,15 +144,15 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     )
     if rules_share is not None:
         line += f", and {len(answer['rules'])} mimic rules agree ({rules_share:.1%})"
-    if read.not_whole is not None:
-        line += f"; MuJoCo compiles the file only without shapes and inertias: {read.not_whole}"
-    return f"{line}; {_pinocchios(read, ours, bound)}"
+    if reading.shapes_refusal is not None:
+        line += f"; MuJoCo compiles the file only without shapes and inertias: {reading.shapes_refusal}"
+    return f"{line}; {_compare_with_pinocchio(reading, ours, bound)}"
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     """Return the largest ratio of error to bound over all mimic rules; None without mimic rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
-    residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
+    residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
     if different := active.symmetric_difference(rules.keys() | set(answer["apart"])):
         first = min(different)
@@ -184,31 +184,31 @@ def _error(where: str, found: str) -> OracleError:
     )
 
 
-def _placements(found: Mapping[str, Any]) -> FloatArray:
-    rows = unpacked(found)
+def _unpack_placements(found: Mapping[str, Any]) -> FloatArray:
+    rows = unpack_array(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0
     return T
 
 
-def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    units = worst_of_each(ours, theirs, bound.scale, 2)
+def _compute_bound_shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
+    units = worst_disagreements(ours, theirs, bound.scale, 2)
     share: FloatArray = units / result_k(bound, units.shape)
     return share
 
 
-def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    if read.path is None:
+def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound) -> str:
+    if reading.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
-    found = read.pinocchio or {"error": "the process of the reader ended"}
+    found = reading.pinocchio or {"error": "the process of the reader ended"}
     if "error" in found:
         return f"not compared with Pinocchio's MJCF reader ({found['error']})"
     names = list(found["bodies"])
     if not names:
         return "Pinocchio's MJCF reader also finds no body"
-    places = [name for name, _ in read.answer["frames"]]
-    bodies, theirs = [places.index(name) for name in names], _placements(found["placements"])
-    share = _shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
+    places = [name for name, _ in reading.answer["frames"]]
+    bodies, theirs = [places.index(name) for name in names], _unpack_placements(found["placements"])
+    share = _compute_bound_shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
     if (share <= 1.0).all():
         return "Pinocchio's MJCF reader agrees on the bodies"
     f = int(share.max(axis=0).argmax())

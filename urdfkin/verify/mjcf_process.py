@@ -34,12 +34,12 @@ from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.pinocchio import pinocchio
 
 #: Number of coordinates of a free joint.
-_CARTESIAN = 7
-_NAMED = 5
+_FREE_JOINT_SIZE = 7
+_MAX_NAMES = 5
 #: Maximum size of the output of a process, bytes.
-MOST = 400_000_000
+MAX_OUTPUT_BYTES = 400_000_000
 
-_TOO_MUCH = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
+_MEMORY_HINT = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -51,25 +51,25 @@ def serve() -> None:
             with suppress(InstallationError):
                 pinocchio()
         limit_process(request["seconds"])
-        for answer in answers(request):
+        for answer in compute_answers(request):
             write_answer(answer)
     except Exception as error:
-        write_answer(error_answer(error, "MuJoCo cannot compile this MJCF"))
+        write_answer(make_error_answer(error, "MuJoCo cannot compile this MJCF"))
     # `os._exit` skips the exit handlers of the libraries.
     os._exit(0)
 
 
-def error_answer(error: Exception, what: str) -> dict[str, Any]:
+def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
     """Return an answer that makes `parse_answers` raise an error; `what` describes an unexpected error."""
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
-        return {"error": parts | {"found": _with_memory_hint(error.found)}}
-    found = _TOO_MUCH if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"[:2000]
+        return {"error": parts | {"found": _add_memory_hint(error.found)}}
+    found = _MEMORY_HINT if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"[:2000]
     return {"error": {"what": what, "found": found}}
 
 
-def _with_memory_hint(found: str | None) -> str | None:
-    return f"{found} Perhaps {_TOO_MUCH}" if found and found.endswith("unknown exception!") else found
+def _add_memory_hint(found: str | None) -> str | None:
+    return f"{found} Perhaps {_MEMORY_HINT}" if found and found.endswith("unknown exception!") else found
 
 
 def write_answer(answer: Mapping[str, Any]) -> None:
@@ -78,12 +78,12 @@ def write_answer(answer: Mapping[str, Any]) -> None:
 
 
 def parse_answers(
-    output: bytes, status: int | None, *, library: str, name: str, patience: float
+    output: bytes, status: int | None, *, library: str, name: str, timeout: float
 ) -> tuple[list[dict[str, Any]], str]:
     """Return the answers in the output of a process, and the reason why further answers are missing.
 
     Incomplete lines and lines that libraries print are skipped. A `status` of None means that the process ran
-    longer than `patience` (s). Raises InputError if the process reports an error.
+    longer than `timeout` (s). Raises InputError if the process reports an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -92,13 +92,13 @@ def parse_answers(
             parts = {key: error.get(key) for key in ("found", "remedy")}
             raise InputError(error["what"], where=error.get("where") or name, **parts)
     if status is None:
-        return answers, f"{library} did not finish within {patience:g} s"
-    if len(output) > MOST:
-        return answers, f"{library} returned more than {MOST} bytes"
-    return answers, f"{library}'s process ended with status {status}: perhaps {_TOO_MUCH}"
+        return answers, f"{library} did not finish within {timeout:g} s"
+    if len(output) > MAX_OUTPUT_BYTES:
+        return answers, f"{library} returned more than {MAX_OUTPUT_BYTES} bytes"
+    return answers, f"{library}'s process ended with status {status}: perhaps {_MEMORY_HINT}"
 
 
-def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
 
     `samples` is the number of random configurations besides the zero configuration; 0: no configurations.
@@ -106,31 +106,31 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
     read = read_mjcf(source, request["name"])
-    q = _configurations(read, samples)
-    yield _answer(read, q)
+    q = _make_configurations(read, samples)
+    yield _make_answer(read, q)
     if samples or read.aligns_free_bodies:
         try:
             whole = read_mjcf(source, request["name"], with_shapes=True)
-            q = _configurations(whole, samples)
-            yield _answer(whole, q)
+            q = _make_configurations(whole, samples)
+            yield _make_answer(whole, q)
             read = whole
         except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo compiles the file, but the result is not a tree.
             found = error.found if isinstance(error, InputError) else str(error)
-            yield {"not_whole": _with_memory_hint(found) or _TOO_MUCH}
+            yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:
-        yield {"pinocchio": _pinocchios(path, read, q)}
+        yield {"pinocchio": _compute_with_pinocchio(path, read, q)}
 
 
-def _configurations(read: Mjcf, samples: int) -> FloatArray:
+def _make_configurations(read: Mjcf, samples: int) -> FloatArray:
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
     return np.vstack((neutral(read.tree), drawn))
 
 
-def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
+def _make_answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
     answer: dict[str, Any] = {
         "urdf": to_urdf(read.tree),
         "listed": [astuple(one) for one in read.remarks],
@@ -141,33 +141,33 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
     }
     if len(q):
         answer |= {
-            "q": packed(q),
-            "placements": packed(read.placements(q)[..., :3, :]),
-            "lengths": packed(read.distance_bounds(q)),
-            "angles": packed(read.reference_angles(q)),
-            "residuals": packed(read.residuals(q)),
-            "rule_sizes": packed(read.rule_scales(q)),
+            "q": pack_array(q),
+            "placements": pack_array(read.placements(q)[..., :3, :]),
+            "lengths": pack_array(read.distance_bounds(q)),
+            "angles": pack_array(read.reference_angles(q)),
+            "residuals": pack_array(read.residuals(q)),
+            "rule_sizes": pack_array(read.rule_scales(q)),
         }
     return answer
 
 
-def packed(numbers: FloatArray) -> dict[str, Any]:
+def pack_array(numbers: FloatArray) -> dict[str, Any]:
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 
 
-def unpacked(found: Mapping[str, Any]) -> FloatArray:
+def unpack_array(found: Mapping[str, Any]) -> FloatArray:
     numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 
 
-def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
+def _compute_with_pinocchio(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
     bodies = [name for name, (kind, i) in read.frames.items() if kind == "body" and i]
     try:
         placed = _pinocchio_placements(path, read.qpos(q), read.qpos_index, bodies)
     except (OracleError, InstallationError) as error:
         return {"error": str(error)}
-    return {"bodies": bodies, "placements": packed(placed[..., :3, :])}
+    return {"bodies": bodies, "placements": pack_array(placed[..., :3, :])}
 
 
 def _pinocchio_placements(
@@ -182,9 +182,9 @@ def _pinocchio_placements(
         model = pin.buildModelFromMJCF(path)
     except Exception as error:  # Pinocchio's parsers raise many types of exceptions.
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
-    joints = dict(_numbered(model, list(coordinates)))
+    joints = dict(_list_coordinates(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
-        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
+        found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_MAX_NAMES])
         raise OracleError("the reader finds different joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
         raise OracleError("the reader does not find a body of the file", found=missing[0])
@@ -194,7 +194,7 @@ def _pinocchio_placements(
         q = pin.neutral(model)
         for name, at in coordinates.items():
             (first, count), x = joints[name], numbers[at]
-            if count == _CARTESIAN:
+            if count == _FREE_JOINT_SIZE:
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
@@ -205,7 +205,7 @@ def _pinocchio_placements(
     return out
 
 
-def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
+def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
     Pinocchio combines several joints of a body into one joint with the name `Composite_` and the name of the

@@ -38,23 +38,26 @@ from urdfkin.verify.oracle import (
     Frames,
     Oracle,
     QueryBatch,
-    locked_by_rules,
+    find_locked_values,
     mimic_rules,
     nearest_quaternion,
 )
-from urdfkin.verify.pinocchio import depth_of
+from urdfkin.verify.pinocchio import tree_depth
 
 #: Placeholder for the mass (kg) and the moments of inertia (kg m^2) of each link.
 _MASS = "1"
 #: Maximum number of links in a chain; MuJoCo's loading time grows with the square of this number.
 #: MuJoCo itself rejects chains of more than 1,023 links, but only after the loading time.
-_DEEPEST = 1_000
+_MAX_DEPTH = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
-_PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
+_REPLACEMENT_JOINTS = {
+    "planar": ("slide x", "slide y", "hinge"),
+    "floating": ("slide x", "slide y", "slide z", "ball"),
+}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: Number of coordinates and number of joint velocities of a joint in urdfkin, by the kind of the joint.
 #: All other kinds have one coordinate and one joint velocity.
-_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
+_JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,33 +93,33 @@ class MujocoOracle(Oracle):
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
         super().__init__(text, tree, **how)
         self._mujoco, self.nv = import_mujoco(), tree.nv
-        if (depth := depth_of(tree)) > _DEEPEST:
+        if (depth := tree_depth(tree)) > _MAX_DEPTH:
             raise OracleError(
-                f"MuJoCo checks chains of up to {_DEEPEST:,} links",
+                f"MuJoCo checks chains of up to {_MAX_DEPTH:,} links",
                 where=tree.name,
                 found=f"{depth:,}",
             )
         try:
-            joints, links = _ordered(text, self.root_joint)
+            joints, links = _read_joints(text, self.root_joint)
         except (ValueError, KeyError, ExpatError) as error:
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
-        coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        locked = locked_by_rules(self.lock, coupled)  # Locked joints stay in MuJoCo's model.
-        rules = self.rules([name for name in moving if name not in locked])
+        lock_mimic_joints = mimic_rules(text, moving, tree.name) if self.mimic else {}
+        locked = find_locked_values(self.lock, lock_mimic_joints)  # Locked joints stay in MuJoCo's model.
+        rules = self.read_rules([name for name in moving if name not in locked])
         base = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if base else []), *links])}
-        self._model = self._compiled([*base, *joints], links[0])
-        self._indices = list(self._joint_indices([*base, *joints], rules, locked))
+        self._model = self._compile_model([*base, *joints], links[0])
+        self._indices = list(self._find_joint_indices([*base, *joints], rules, locked))
         bodies = {link: self._model.body(self._bodies[link]).id for link in links}
         children = {joint.name: bodies[joint.child] for joint in joints}
         self._frames = Frames(self.title, tree.name, bodies, children, {})
-        self._constant = all(joint.kind not in _PARTS for joint in self._indices)
+        self._constant = all(joint.kind not in _REPLACEMENT_JOINTS for joint in self._indices)
         self.new_data = lambda: self._mujoco.MjData(self._model)
 
     # -- the model -----------------------------------------------------------------------------------
 
-    def _compiled(self, joints: Sequence[_Joint], root: str) -> Any:
+    def _compile_model(self, joints: Sequence[_Joint], root: str) -> Any:
         mujoco = self._mujoco
         robot = Element("robot", name="r")
         options = {"fusestatic": "false", "boundmass": "0", "boundinertia": "0"}
@@ -127,25 +130,25 @@ class MujocoOracle(Oracle):
             moments = {f"i{a}{b}": _MASS if a == b else "0" for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
             SubElement(inertial, "inertia", moments)
         for i, joint in enumerate(joints):
-            robot.append(self._joint(i, joint))
+            robot.append(self._make_joint_element(i, joint))
         try:
             spec = mujoco.MjSpec.from_string(tostring(robot, encoding="unicode"))
             spec.option.gravity = (0.0, 0.0, 0.0)
             for i, joint in enumerate(joints):
-                for part in _PARTS.get(joint.kind, ()):
+                for part in _REPLACEMENT_JOINTS.get(joint.kind, ()):
                     what, _, axis = part.partition(" ")
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            return _with_mass_at_root(compile_spec(spec), self._bodies[root])
+            return _move_mass_to_root(compile_spec(spec), self._bodies[root])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
             raise OracleError(
                 "MuJoCo does not accept this robot", where=self.tree.name, found=first
             ) from error
 
-    def _joint(self, i: int, joint: _Joint) -> Element:
-        kind = "fixed" if joint.kind in _PARTS else joint.kind
+    def _make_joint_element(self, i: int, joint: _Joint) -> Element:
+        kind = "fixed" if joint.kind in _REPLACEMENT_JOINTS else joint.kind
         element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
         SubElement(element, "parent", link=self._bodies[joint.parent])
         SubElement(element, "child", link=self._bodies[joint.child])
@@ -160,19 +163,19 @@ class MujocoOracle(Oracle):
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
-    def _joint_indices(
+    def _find_joint_indices(
         self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], locked: Mapping[str, float]
     ) -> Iterator[_MujocoIndices]:
         independent_joints, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             if joint.name and joint.name not in rules and joint.name not in locked:
-                nq, nv = _SIZES.get(joint.kind, (1, 1))
+                nq, nv = _JOINT_SIZES.get(joint.kind, (1, 1))
                 independent_joints[joint.name] = q, v
                 q, v = q + nq, v + nv
         for i, joint in enumerate(joints):
             if joint.kind == "fixed":
                 continue
-            first = _PARTS.get(joint.kind, ("",))[0]
+            first = _REPLACEMENT_JOINTS.get(joint.kind, ("",))[0]
             compiled_joint = self._model.joint(f"j{i} {first}" if first else f"j{i}")
             indices = int(compiled_joint.qposadr[0]), int(compiled_joint.dofadr[0])
             if joint.name in locked:
@@ -191,77 +194,82 @@ class MujocoOracle(Oracle):
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, x: QueryBatch) -> FloatArray:
-        return self._poses(x, 1, lambda body, at: None)
+        return self._compute_poses(x, 1, lambda body, at: None)
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        poses, velocity, _ = self._moved(x, 2)
-        return _referred(x.reference, poses, velocity)
+        poses, velocity, _ = self._compute_motion(x, 2)
+        return _change_reference(x.reference, poses, velocity)
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
-        poses, velocity, acceleration = self._moved(x, 3)
+        poses, velocity, acceleration = self._compute_motion(x, 3)
         if not Reference.of(x.reference).at_world:
-            return _referred(x.reference, poses, acceleration)
+            return _change_reference(x.reference, poses, acceleration)
         # A spatial acceleration can be shifted to the world origin; a classical acceleration cannot.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
-        out, velocity = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
+        out, velocity = (
+            _change_reference(x.reference, poses, spatial),
+            _change_reference(x.reference, poses, velocity),
+        )
         out[..., :3] += np.cross(velocity[..., 3:], velocity[..., :3])
         return out
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         J = np.empty((len(x.q), len(x.frames), 6, self.nv))
-        spread = self._spread(x.q)
+        S_of_sample = self._velocity_matrix(x.q)
 
         def read(body: int, at: tuple[int, int]) -> None:
-            J[at] = self._columns(self._mujoco.mj_jac, body) @ spread[at[0] % len(spread)]
+            J[at] = self._read_jacobian(self._mujoco.mj_jac, body) @ S_of_sample[at[0] % len(S_of_sample)]
 
-        poses = self._poses(x, 1, read)
-        return _referred(x.reference, poses, J, columns=True)
+        poses = self._compute_poses(x, 1, read)
+        return _change_reference(x.reference, poses, J, columns=True)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         J, rate = np.empty((2, len(x.q), len(x.frames), 6, self.nv))
         velocity = np.empty((len(x.q), len(x.frames), 6))
-        spread, spread_rate = self._spread(x.q), self._spread_rate(x.q, x.v)
+        S_of_sample, spread_rate = self._velocity_matrix(x.q), self._velocity_matrix_rate(x.q, x.v)
 
         def read(body: int, at: tuple[int, int]) -> None:
-            S, S_rate = spread[at[0] % len(spread)], spread_rate[at[0] % len(spread_rate)]
-            J_full = self._columns(self._mujoco.mj_jac, body)
+            S, S_rate = S_of_sample[at[0] % len(S_of_sample)], spread_rate[at[0] % len(spread_rate)]
+            J_full = self._read_jacobian(self._mujoco.mj_jac, body)
             J[at] = J_full @ S
-            rate[at] = self._columns(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
-            velocity[at] = self._six(self._mujoco.mj_objectVelocity, body)
+            rate[at] = self._read_jacobian(self._mujoco.mj_jacDot, body) @ S + J_full @ S_rate
+            velocity[at] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
 
-        poses = self._poses(x, 2, read)
+        poses = self._compute_poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
         if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
-        out = _referred(which, poses, rate, columns=True)
+        out = _change_reference(which, poses, rate, columns=True)
         if which.at_world:  # The time derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
-    def _moved(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _compute_motion(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
         def read(body: int, at: tuple[int, int]) -> None:
-            velocity[at] = self._six(self._mujoco.mj_objectVelocity, body)
+            velocity[at] = self._read_six_vector(self._mujoco.mj_objectVelocity, body)
             if count == len("qva"):
-                acceleration[at] = self._six(self._mujoco.mj_objectAcceleration, body)
+                acceleration[at] = self._read_six_vector(self._mujoco.mj_objectAcceleration, body)
 
-        return self._poses(x, count, read), velocity, acceleration
+        return self._compute_poses(x, count, read), velocity, acceleration
 
-    def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
+    def _compute_poses(
+        self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
+    ) -> FloatArray:
         """Return placements (n, frames, 4, 4); call `read(body, (k, f))` for each sample k and frame f.
 
         MuJoCo receives the first `count` of the inputs q, v and a. `read` can read further results from
         `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
-        bodies = [self._frames.index(name) for name in x.frames]
+        bodies = [self._frames.find_index(name) for name in x.frames]
         out = np.zeros((len(x.q), len(bodies), 4, 4))
         out[..., 3, 3] = 1.0
-        qpos, rates, second = self._states(x, count)
+        qpos, rates, second = self._convert_inputs(x, count)
         for k in range(len(x.q)):
             data.qpos[:] = qpos[k]
             mujoco.mj_kinematics(model, data)
@@ -277,7 +285,7 @@ class MujocoOracle(Oracle):
                 read(body, (k, f))
         return out
 
-    def _columns(self, function: Callable[..., None], body: int) -> FloatArray:
+    def _read_jacobian(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return the Jacobian (6, MuJoCo's nv) of the body's origin, [linear; angular]."""
         J = np.zeros((6, self._model.nv))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
@@ -285,7 +293,7 @@ class MujocoOracle(Oracle):
         J[:3], J[3:] = linear, angular
         return J
 
-    def _six(self, function: Callable[..., None], body: int) -> FloatArray:
+    def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
@@ -294,7 +302,9 @@ class MujocoOracle(Oracle):
 
     # -- layout --------------------------------------------------------------------------------------
 
-    def _states(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    def _convert_inputs(
+        self, x: QueryBatch, count: int
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for joint in self._indices:
@@ -314,11 +324,11 @@ class MujocoOracle(Oracle):
                 qpos[:, at] = joint.multiplier * coordinates[:, 0] + joint.offset
         if count == 1:
             return qpos, None, None
-        S, v = self._spread(q), x.v
+        S, v = self._velocity_matrix(q), x.v
         rates = (S @ v[..., None])[..., 0]
         second = None
         if count == len("qva"):
-            second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
+            second = (S @ x.a[..., None] + self._velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
             # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
@@ -331,7 +341,7 @@ class MujocoOracle(Oracle):
                 second[:, at + 3 : at + 6] = (back @ acceleration[..., 3:, None])[..., 0]
         return qpos, rates, second
 
-    def _spread(self, q: FloatArray) -> FloatArray:
+    def _velocity_matrix(self, q: FloatArray) -> FloatArray:
         """Return the matrices S that convert urdfkin's v to MuJoCo's qvel: qvel = S v.
 
         The shape is (n, MuJoCo's nv, nv). If S is the same in all configurations, the first axis has the
@@ -342,24 +352,24 @@ class MujocoOracle(Oracle):
             at, v = joint.qvel, joint.v
             if v < 0:
                 continue
-            if joint.kind in _PARTS:
+            if joint.kind in _REPLACEMENT_JOINTS:
                 R, slides = _rotation_of_joint(joint, q)
                 S[:, at : at + slides, v : v + slides] = R
-                rotations = np.arange(slides, _SIZES[joint.kind][1])
+                rotations = np.arange(slides, _JOINT_SIZES[joint.kind][1])
                 S[:, at + rotations, v + rotations] = 1.0
             else:
                 S[:, at, v] = joint.multiplier
         return S
 
-    def _spread_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
+    def _velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the time derivative S' of S, computed from R' = R [w]x of floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
-            if first >= 0 and joint.kind in _PARTS:
+            if first >= 0 and joint.kind in _REPLACEMENT_JOINTS:
                 R, slides = _rotation_of_joint(joint, q)
                 w = np.zeros((len(q), 3))
-                w[:, (0 if slides == 3 else 2) :] = v[:, first + slides : first + _SIZES[joint.kind][1]]
+                w[:, (0 if slides == 3 else 2) :] = v[:, first + slides : first + _JOINT_SIZES[joint.kind][1]]
                 w_cross = np.cross(w[:, None, :], np.eye(3)[None]).swapaxes(-1, -2)
                 S_rate[:, at : at + slides, first : first + slides] = R @ w_cross[:, :slides, :slides]
         return S_rate
@@ -382,7 +392,7 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
     return _scalar_first(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
 
 
-def _with_mass_at_root(model: Any, root: str) -> Any:
+def _move_mass_to_root(model: Any, root: str) -> Any:
     """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
     MuJoCo computes velocities at the centre of mass. With the centre of mass at the root's origin, MuJoCo
@@ -399,7 +409,7 @@ def _with_mass_at_root(model: Any, root: str) -> Any:
     return model
 
 
-def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
+def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
     """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
@@ -447,7 +457,7 @@ def _rotation(quaternion: FloatArray) -> FloatArray:
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
-def _referred(
+def _change_reference(
     reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
 ) -> FloatArray:
     """Convert six-vectors, or Jacobian columns, from LOCAL_WORLD_ALIGNED to another reference frame."""

@@ -59,10 +59,10 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
         for joint in parse_xml(text).iterfind("joint")
         if (rule := joint.find("mimic")) is not None and (name := joint.get("name", "")) in joints
     }
-    return resolved_rules(rules)
+    return resolve_rules(rules)
 
 
-def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
+def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules, so that each rule refers to an independent joint.
 
     A chain of rules gives q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
@@ -83,10 +83,10 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     return {joint: known[joint] for joint in rules}
 
 
-def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
+def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
     """Return the values of the locked joints and of all joints that mimic a locked joint.
 
-    >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
+    >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
     """
     moved = {
@@ -98,9 +98,9 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
-#: `_COORDINATES` maps each size to the joint's number of coordinates in urdfkin.
+#: `_COORDINATE_COUNTS` maps each size to the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
-_COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
+_COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
@@ -131,7 +131,7 @@ class PinocchioLayout:
         for name, size in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
-                self.nq, self.nv = self.nq + _COORDINATES[size], self.nv + size[1]
+                self.nq, self.nv = self.nq + _COORDINATE_COUNTS[size], self.nv + size[1]
         self._joints = list[_JointIndices]()
         for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
@@ -154,7 +154,7 @@ class PinocchioLayout:
                 self._factor[joint.full_v + c] = joint.multiplier
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
-        self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
+        self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
         #: `_same_q` and `_same_v` are True if q and v are valid inputs of Pinocchio without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
@@ -163,7 +163,7 @@ class PinocchioLayout:
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    def _select_by_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -172,7 +172,7 @@ class PinocchioLayout:
             np.array([joint.offset for joint in joints]),
         )
 
-    def configurations(self, q: FloatArray) -> FloatArray:
+    def convert_q(self, q: FloatArray) -> FloatArray:
         """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
         if self._same_q:
             return np.ascontiguousarray(q)
@@ -193,7 +193,7 @@ class PinocchioLayout:
                 full[:, i + 2], full[:, i + 3] = np.cos(q[:, k + 2]), np.sin(q[:, k + 2])
         return full
 
-    def rates(self, v: FloatArray) -> FloatArray:
+    def convert_rates(self, v: FloatArray) -> FloatArray:
         """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
         if self._same_v:
             return np.ascontiguousarray(v)
@@ -206,7 +206,7 @@ class PinocchioLayout:
         """Return the Jacobian J_full G for urdfkin's v, without the base's columns."""
         if self._same_v:
             return full
-        return coupled(full, self._columns, self._index, self._factor, self.nv)
+        return couple_columns(full, self._columns, self._index, self._factor, self.nv)
 
 
 #: Pinocchio's name of the world, the parent of a root joint.
@@ -233,12 +233,12 @@ class Frames:
         self._oracle, self._robot = oracle, robot
         self._bodies, self._joints, self._parents = bodies, joints, parents
 
-    def index(self, name: str) -> int:
+    def find_index(self, name: str) -> int:
         """Return the index of a frame; raise OracleError for an unknown or ambiguous name."""
         if isinstance(name, LinkFrame):
-            return self._index_in(self._bodies, name, str(name)[5:])
+            return self._find_index(self._bodies, name, str(name)[5:])
         if isinstance(name, JointFrame):
-            return self._index_in(self._joints, name, str(name)[6:])
+            return self._find_index(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
         if body is not None and joint is not None and self._parents.get(body, body) != joint:
             raise self._error(f"two of {self._oracle}'s frames have this name", name)
@@ -248,9 +248,9 @@ class Frames:
             return joint
         if (parts := _PREFIXED.fullmatch(name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
-        return self._index_in(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
+        return self._find_index(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
-    def _index_in(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
+    def _find_index(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
         if (index := frames.get(plain_name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
         return index
@@ -259,16 +259,16 @@ class Frames:
         return OracleError(what, where=self._robot, found=repr(str(name)))
 
 
-def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
+def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
     """Return the frames of a Pinocchio model.
 
-    If `stands_on_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
+    If `includes_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
     """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
             (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
-    if stands_on_world:
+    if includes_world:
         bodies[WORLD] = 0
     parents = {index: int(frame.parentFrame) for index, frame in enumerate(model.frames)}
     return Frames("Pinocchio", str(model.name), bodies, joints, parents)
@@ -296,21 +296,21 @@ def free_flyer(base: BaseNumbers) -> FloatArray:
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
-def free_flyer_rates(base: BaseNumbers) -> FloatArray:
+def free_flyer_velocity(base: BaseNumbers) -> FloatArray:
     """Return the base's velocity in the axes of the base, (..., 6)."""
-    return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
+    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
-def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
+def free_flyer_acceleration(base: BaseNumbers) -> FloatArray:
     """Return the base's spatial acceleration, acc - w x vel, in the axes of the base, (..., 6)."""
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
-    return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
+    return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
-    K = davenport(M)
+    K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Rounding gives the computed q small components along the other eigenvectors of K.
     # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
@@ -319,7 +319,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     return unit
 
 
-def davenport(M: NDArray[Any]) -> NDArray[Any]:
+def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
     """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); K = 4 q q^T - I for a rotation M."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
@@ -331,7 +331,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
     return K
 
 
-def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
+def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Rotate the linear part and the angular part y of each six-vector by R^T.
 
     Let u be the vector part and w the scalar part of the quaternion. With c = y x u,
@@ -344,21 +344,21 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     return rotated.reshape(*rotated.shape[:-2], 6)
 
 
-_NAMED = 5
+_MAX_NAMES = 5
 
 #: Names of the coordinates of a planar joint (3 joint velocities) and of a floating joint (6).
-_OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
+_Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 #: Names of the joint velocities of a planar joint (3) or a floating joint (6).
-_OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
+_VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
 class _CoordinateNames:
     """Map names of joints and coordinates to indices in q or v.
 
-    >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _OF_Q)
-    >>> names.place("base.y"), names.place("base"), names.place("elbow")
+    >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _Q_SUFFIXES)
+    >>> names.find_index("base.y"), names.find_index("base"), names.find_index("elbow")
     (1, slice(0, 3, None), 3)
-    >>> names.pairs("ready, base.x = 5mm, elbow=pi / 2")
+    >>> names.split_pairs("ready, base.x = 5mm, elbow=pi / 2")
     [('base.x', '5mm'), ('elbow', 'pi / 2')]
     """
 
@@ -368,7 +368,7 @@ class _CoordinateNames:
             self._joints[joint] = at, suffixes.get(rates, ())
             at += len(suffixes.get(rates, "1"))
 
-    def place(self, name: str) -> int | slice:
+    def find_index(self, name: str) -> int | slice:
         """Return a coordinate's index or a joint's slice; raise OracleError for an unknown name."""
         if name in self._joints:
             at, suffixes = self._joints[name]
@@ -379,7 +379,7 @@ class _CoordinateNames:
                 return at + suffixes.index(suffix)
         raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
-    def pairs(self, text: str) -> list[tuple[str, str]]:
+    def split_pairs(self, text: str) -> list[tuple[str, str]]:
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
@@ -392,7 +392,7 @@ class _CoordinateNames:
         return [(m[1], plain[m.end() : end].strip(" ,")) for m, end in zip(starts, ends, strict=False)]
 
 
-def _number(text: str) -> float:
+def _parse_number(text: str) -> float:
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
@@ -413,10 +413,10 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments that an oracle receives for n configurations.
 
-    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `joints` is True, `frames`
-    contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `frames_are_joints` is True,
+    `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
 
-    If `divided` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
+    If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
     frame may round differently from its function for several frames. Therefore, Pinocchio uses the function
     for several frames even if `frames` contains one frame.
     """
@@ -425,8 +425,8 @@ class QueryBatch(NamedTuple):
     inputs: tuple[FloatArray, ...]
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
     base: BaseNumbers | None = None
-    joints: bool = False
-    divided: bool = False
+    frames_are_joints: bool = False
+    is_partial: bool = False
 
     @property
     def q(self) -> FloatArray:
@@ -442,9 +442,9 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The user's arguments of one call, which `rows` converts for an oracle.
+    """The user's arguments of one call, which `select` converts for an oracle.
 
-    `named` has an entry for each input: the user's text or mapping with names, or None for an array.
+    `named_inputs` has an entry for each input: the user's text or mapping with names, or None for an array.
     `joints` lists the name and the number of joint velocities of each joint that has coordinates.
     """
 
@@ -454,15 +454,15 @@ class OracleQuery:
         reference: Reference | str,
         base: BaseNumbers | None,
         inputs: Sequence[ArrayLike],
-        named: Sequence[str | Mapping[str, ArrayLike] | None] = (),
+        named_inputs: Sequence[str | Mapping[str, ArrayLike] | None] = (),
         joints: Sequence[tuple[str, int]] = (),
     ) -> None:
         self._is_one = isinstance(frame, str)
         self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
         self.reference, self.base = reference, base
-        self._arrays, self._named, self._joints = inputs, named or [None] * len(inputs), joints
+        self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
-    def read(self) -> None:
+    def convert_inputs(self) -> None:
         """Convert the inputs before the computation writes to `out`, which may share memory with an input."""
         _ = self._inputs
 
@@ -470,17 +470,26 @@ class OracleQuery:
     def _inputs(self) -> tuple[FloatArray, ...]:
         return tuple(
             np.asarray(x, dtype=np.float64)
-            if named is None
-            else self._with_named(np.array(x, float), named, of)
-            for x, named, of in zip(self._arrays, self._named, (_OF_Q, _OF_RATES, _OF_RATES), strict=False)
+            if named_inputs is None
+            else self._set_named_values(np.array(x, float), named_inputs, of)
+            for x, named_inputs, of in zip(
+                self._arrays, self._named, (_Q_SUFFIXES, _VELOCITY_SUFFIXES, _VELOCITY_SUFFIXES), strict=False
+            )
         )
 
-    def _with_named(
-        self, x: FloatArray, named: str | Mapping[str, ArrayLike], suffixes: Mapping[int, tuple[str, ...]]
+    def _set_named_values(
+        self,
+        x: FloatArray,
+        named_inputs: str | Mapping[str, ArrayLike],
+        suffixes: Mapping[int, tuple[str, ...]],
     ) -> FloatArray:
         names = _CoordinateNames(self._joints, suffixes)
-        for name, value in named.items() if isinstance(named, Mapping) else names.pairs(named):
-            x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
+        for name, value in (
+            named_inputs.items() if isinstance(named_inputs, Mapping) else names.split_pairs(named_inputs)
+        ):
+            x[..., names.find_index(name)] = (
+                _parse_number(value) if isinstance(value, str) else np.asarray(value, float)
+            )
         return x
 
     @cached_property
@@ -495,7 +504,7 @@ class OracleQuery:
     def n(self) -> int:
         return math.prod(self.shape)
 
-    def rows(self, part: slice | IntArray) -> QueryBatch:
+    def select(self, part: slice | IntArray) -> QueryBatch:
         """Return the configurations with the indices `part` in the flat batch (C order)."""
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
@@ -511,7 +520,7 @@ class OracleQuery:
             base = BaseRows(pick(base.placement, 2), pick(base.velocity), pick(base.acceleration))
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
-    def flat(self, result: FloatArray, axes: int) -> FloatArray:
+    def flatten_result(self, result: FloatArray, axes: int) -> FloatArray:
         """Return `result` in the shape (n, frames, ...).
 
         `axes` is the number of axes of the result for one configuration and one frame. Raises OracleError if
@@ -564,7 +573,7 @@ class Oracle:
         self.text, self.tree, self.mimic = text, tree, mimic
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
-    def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
+    def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the mimic rules of `joints`, the library's moving joints.
 
         Raises OracleError if the joints or their order differ from the tree's.
@@ -578,7 +587,7 @@ class Oracle:
         ):
             if theirs != own:
                 found = (
-                    ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED])
+                    ", ".join(sorted(set(theirs) ^ set(own))[:_MAX_NAMES])
                     or "the same names in a different order"
                 )
                 raise OracleError(
@@ -625,7 +634,9 @@ class Oracle:
         return np.where(out[..., 3:] < 0.0, -out, out)
 
 
-def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
+def couple_columns(
+    full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
+) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
@@ -635,7 +646,7 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:
         begin = time.thread_time()
-        sums = _coupled(rows, columns, index, factor, nv)
+        sums = _couple_rows(rows, columns, index, factor, nv)
         preload.add_time("coupling", time.thread_time() - begin)
         return sums.reshape(*full.shape[:-1], nv)
     out = np.zeros(len(rows) * nv)
@@ -644,7 +655,9 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
 
 
 @np.errstate(all="ignore")
-def _coupled(rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
+def _couple_rows(
+    rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
+) -> FloatArray:
     sums = np.zeros((len(rows), nv))
     for column in columns:
         sums[:, index[column]] += rows[:, column] * factor[column]

@@ -22,23 +22,24 @@ OracleName = Literal["pinocchio", "mujoco"]
 class OracleLibrary:
     """An oracle: a library that reads the URDF text and computes the quantities that urdfkin computes.
 
-    `oracle` is a function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the model of a
-    robot. `size` is a function that converts error bounds. The argument of `size` contains the `Magnitudes`
-    for a comparison with Pinocchio. The result contains the `Magnitudes` for a comparison with this library.
+    `make_oracle` is a function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the model
+    of a robot. `adapt_magnitudes` is a function that converts error bounds. The argument of
+    `adapt_magnitudes` contains the `Magnitudes` for a comparison with Pinocchio. The result contains the
+    `Magnitudes` for a comparison with this library.
     """
 
     name: OracleName
     title: str
     package: str
     version: Callable[[], str]
-    oracle: Callable[..., Any]
-    size: Callable[[Any], Any]
+    make_oracle: Callable[..., Any]
+    adapt_magnitudes: Callable[[Any], Any]
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
         return _library, (self.name,)
 
     @property
-    def words(self) -> str:
+    def name_and_version(self) -> str:
         return f"{self.title} {self.version()}"
 
 
@@ -48,7 +49,7 @@ PINOCCHIO = OracleLibrary(
     "pin",
     lazy_import("urdfkin.verify.pinocchio:version"),
     lazy_import("urdfkin.verify.pinocchio:PinocchioOracle"),
-    lambda size: size,
+    lambda magnitudes: magnitudes,
 )
 MUJOCO = OracleLibrary(
     "mujoco",

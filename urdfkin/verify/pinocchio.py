@@ -32,11 +32,11 @@ from urdfkin.verify.oracle import (
     Oracle,
     PinocchioLayout,
     QueryBatch,
-    frames_of,
+    find_locked_values,
     free_flyer,
-    free_flyer_rates,
-    free_flyer_second_rates,
-    locked_by_rules,
+    free_flyer_acceleration,
+    free_flyer_velocity,
+    make_pinocchio_frames,
     mimic_rules,
 )
 
@@ -60,7 +60,7 @@ def pinocchio() -> Any:
             remedy=f"pip install --force-reinstall {_REQUIREMENT}",
         ) from error
     if not hasattr(module, "buildModelFromXML"):
-        raise _wrong_module(module)
+        raise _make_wrong_module_error(module)
     if not str(module.__version__).startswith(f"{_MAJOR}."):
         raise InstallationError(
             f"urdfkin needs Pinocchio {_MAJOR} for its checks",
@@ -79,10 +79,10 @@ def version() -> str:
         return "not installed"
 
 
-def _wrong_module(module: Any) -> InstallationError:
+def _make_wrong_module_error(module: Any) -> InstallationError:
     file = module.__file__ or next(iter(module.__path__), "a folder without modules")
-    project = _project_of(Path(file))
-    cure = f"pip uninstall {project[0]}" if project else f"rename or remove {file}"
+    project = _find_project(Path(file))
+    repair = f"pip uninstall {project[0]}" if project else f"rename or remove {file}"
     found = (
         f"{project[0]} {project[1]}, another project"
         if project
@@ -92,12 +92,12 @@ def _wrong_module(module: Any) -> InstallationError:
         "the installed module `pinocchio` is not the robotics library Pinocchio, which checks results",
         where=str(file),
         found=found,
-        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_REQUIREMENT}",
+        remedy=f"Pinocchio's package is called pin: {repair}; pip install {_REQUIREMENT}",
         question=QuestionsSection.WRONG_PINOCCHIO,
     )
 
 
-def _project_of(file: Path) -> tuple[str, str] | None:
+def _find_project(file: Path) -> tuple[str, str] | None:
     from importlib import metadata
 
     for project in metadata.distributions():
@@ -108,20 +108,20 @@ def _project_of(file: Path) -> tuple[str, str] | None:
 
 
 #: Bytes of stack for each link; the recursive parser of Pinocchio 4.1.0 needs less than 4 kB for each link.
-_STACK_FOR_A_LINK = 16_384
+_STACK_BYTES_PER_LINK = 16_384
 #: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
-_SHALLOW = 100
+_SAFE_DEPTH = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
-MOST_RATES = 315
+MAX_NV = 315
 
 #: Number of floating-point values in a block of results that fits into the processor's cache.
 _BLOCK_SIZE = 16384
 #: Function of n that returns the results for the next n configurations.
-_Next = Callable[[int], list[FloatArray]]
-_BASE = "base"
+_NextResults = Callable[[int], list[FloatArray]]
+_BASE_NAME = "base"
 
 #: Prefix of link names while Pinocchio reduces a model; XML does not allow this character in names.
-_LINK_MARK = "\x01"
+_LINK_PREFIX = "\x01"
 
 
 def build_model(
@@ -131,7 +131,7 @@ def build_model(
     *,
     mimic: bool = False,
     lock: Mapping[str, float] = MappingProxyType({}),
-    coupled: bool = True,
+    lock_mimic_joints: bool = True,
 ) -> Any:
     """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
 
@@ -139,27 +139,27 @@ def build_model(
     is therefore rejected. A long chain of links is parsed with a larger stack.
 
     `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
-    With `coupled`, the joints that mimic a locked joint are also locked.
+    With `lock_mimic_joints`, the joints that mimic a locked joint are also locked.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
-    if rates > MOST_RATES:
+    if rates > MAX_NV:
         raise OracleError(
-            f"too many joint velocities for Pinocchio: its memory grows with nv^3; the limit is {MOST_RATES}",
+            f"too many joint velocities for Pinocchio: its memory grows with nv^3; the limit is {MAX_NV}",
             where=tree.name,
             found=f"nv = {rates}, which needs {64e-9 * rates**3:.0f} GB",
         )
-    depth = depth_of(tree)
-    if depth < _SHALLOW:
+    depth = tree_depth(tree)
+    if depth < _SAFE_DEPTH:
         model = _parse(text, tree, root_joint, mimic)
     else:
-        model = call_with_stack(depth * _STACK_FOR_A_LINK, lambda: _parse(text, tree, root_joint, mimic))
-    return _reduced(model, text, lock, coupled=coupled) if lock else model
+        model = call_with_stack(depth * _STACK_BYTES_PER_LINK, lambda: _parse(text, tree, root_joint, mimic))
+    return _reduce_model(model, text, lock, lock_mimic_joints=lock_mimic_joints) if lock else model
 
 
-def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool) -> Any:
+def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimic_joints: bool) -> Any:
     pin, q = pinocchio(), pinocchio().neutral(model)
-    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
-    locked = locked_by_rules(lock, rules)
+    rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if lock_mimic_joints else {}
+    locked = find_locked_values(lock, rules)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
         if i >= model.njoints:
@@ -174,10 +174,10 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
-        frame.name = _LINK_MARK + frame.name
+        frame.name = _LINK_PREFIX + frame.name
     reduced = pin.buildReducedModel(model, ids, q)
     for frame in reduced.frames:
-        frame.name = frame.name.removeprefix(_LINK_MARK)
+        frame.name = frame.name.removeprefix(_LINK_PREFIX)
     return reduced
 
 
@@ -206,17 +206,17 @@ class PinocchioOracle(Oracle):
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
         super().__init__(text, tree, **how)
         self._pin = pin = pinocchio()
-        self._model = build_model(text, tree, self.root_joint, lock=self.lock, coupled=self.mimic)
+        self._model = build_model(text, tree, self.root_joint, lock=self.lock, lock_mimic_joints=self.mimic)
         names = list(self._model.names)[1:]
-        self._frames = frames_of(self._model, pin, stands_on_world=self.root_joint is not None)
+        self._frames = make_pinocchio_frames(self._model, pin, includes_world=self.root_joint is not None)
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if self.moving_base:
-            joints, self._index = self._put_on_free_flyer(joints)
-        self._layout = PinocchioLayout(self._model, joints, names, self.rules(names))
+            joints, self._index = self._add_free_flyer(joints)
+        self._layout = PinocchioLayout(self._model, joints, names, self.read_rules(names))
         self._joint_ids = dict(zip(names, joints, strict=True))
         self.new_data = self._model.createData
 
-    def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
+    def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects a link that has the same name as a joint or the free-flyer.
@@ -226,8 +226,8 @@ class PinocchioOracle(Oracle):
         for i in range(1, model.nframes):
             model.frames[i].name = str(i)
         free_flyer_model = pin.Model()
-        joint = free_flyer_model.addJoint(0, pin.JointModelFreeFlyer(), identity, _BASE)
-        base = free_flyer_model.addFrame(pin.Frame(_BASE, joint, 0, identity, pin.FrameType.BODY))
+        joint = free_flyer_model.addJoint(0, pin.JointModelFreeFlyer(), identity, _BASE_NAME)
+        base = free_flyer_model.addFrame(pin.Frame(_BASE_NAME, joint, 0, identity, pin.FrameType.BODY))
         self._model = pin.appendModel(free_flyer_model, model, base, identity)
         frames = {frame.name: i for i, frame in enumerate(self._model.frames)}
         return (
@@ -235,26 +235,26 @@ class PinocchioOracle(Oracle):
             [base, *(frames[str(i)] for i in range(1, model.nframes))],
         )
 
-    def _ids(self, x: QueryBatch) -> list[int]:
-        if x.joints:
+    def _find_ids(self, x: QueryBatch) -> list[int]:
+        if x.frames_are_joints:
             return [self._joint_ids[name.partition(":")[2]] for name in x.frames]
-        return [self._index[self._frames.index(name)] for name in x.frames]
+        return [self._index[self._frames.find_index(name)] for name in x.frames]
 
-    def _reference(self, reference: Reference | str) -> Any:
+    def _convert_reference(self, reference: Reference | str) -> Any:
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 
-    def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
+    def _convert_inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
         """Convert the first `count` of urdfkin's inputs q, v and a to Pinocchio's vectors.
 
         If the base moves, the velocity and the spatial acceleration of the free-flyer are in the base's axes.
         """
         q, *v_and_a = x.inputs[:count]
-        full = [self._layout.configurations(q), *map(self._layout.rates, v_and_a)]
+        full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
         if self.moving_base and x.base is not None:
-            for rates, of_base in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
+            for rates, of_base in zip(full[1:], (free_flyer_velocity, free_flyer_acceleration), strict=False):
                 rates[:, :6] = of_base(x.base)
         return tuple(full)
 
@@ -262,61 +262,69 @@ class PinocchioOracle(Oracle):
 
     def placements(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        return self._collected(
+        return self._collect_results(
             (4, 4),
-            self._inputs(x, 1),
+            self._convert_inputs(x, 1),
             pin.forwardKinematics,
             lambda *which: pin.updateFramePlacement(*which).homogeneous,
-            self._ids(x),
+            self._find_ids(x),
         )
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        return self._six(x, 2, self._pin.getFrameVelocity)
+        return self._six_vectors(x, 2, self._pin.getFrameVelocity)
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
-        return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
+        return self._six_vectors(x, 3, self._pin.getFrameClassicalAcceleration)
 
-    def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
-        return self._collected(
+    def _six_vectors(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
+        return self._collect_results(
             (6,),
-            self._inputs(x, count),
+            self._convert_inputs(x, count),
             self._pin.forwardKinematics,
             lambda *arguments: get(*arguments).vector,
-            self._ids(x),
-            self._reference(x.reference),
+            self._find_ids(x),
+            self._convert_reference(x.reference),
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        if len(x.frames) == 1 and not (x.joints or x.divided):
+        if len(x.frames) == 1 and not (x.frames_are_joints or x.is_partial):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
-            return self._layout.couple(_stacked(self._frame_jacobians(x), *shape))
-        get = pin.getJointJacobian if x.joints else pin.getFrameJacobian
+            return self._layout.couple(_stack_results(self._frame_jacobians(x), *shape))
+        get = pin.getJointJacobian if x.frames_are_joints else pin.getFrameJacobian
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
+        if len(x.frames) != 1 or x.frames_are_joints or x.is_partial or not self._model.nv:
             yield self.jacobians(x)
             return
-        memory = np.empty((min(len(x.q), _block(6, self._model.nv)), 1, 6, self._model.nv))
+        memory = np.empty((min(len(x.q), _block_length(6, self._model.nv)), 1, 6, self._model.nv))
         for block in _blocks(self._frame_jacobians(x), len(x.q), memory):
             yield self._layout.couple(block)
 
-    def _frame_jacobians(self, x: QueryBatch) -> _Next:
-        (one,), wanted = self._ids(x), self._reference(x.reference)
-        found = self._each(self._pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
+    def _frame_jacobians(self, x: QueryBatch) -> _NextResults:
+        (one,), wanted = self._find_ids(x), self._convert_reference(x.reference)
+        found = self._map_configurations(
+            self._pin.computeFrameJacobian, self._convert_inputs(x, 1), one, wanted
+        )
         return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         pin = self._pin
-        get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
+        get = pin.getJointJacobianTimeVariation if x.frames_are_joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
 
     def _columns(
         self, x: QueryBatch, count: int, compute: Callable[..., object], get: Callable[..., FloatArray]
     ) -> FloatArray:
-        inputs, ids, wanted = self._inputs(x, count), self._ids(x), self._reference(x.reference)
-        return self._layout.couple(self._collected((6, self._model.nv), inputs, compute, get, ids, wanted))
+        inputs, ids, wanted = (
+            self._convert_inputs(x, count),
+            self._find_ids(x),
+            self._convert_reference(x.reference),
+        )
+        return self._layout.couple(
+            self._collect_results((6, self._model.nv), inputs, compute, get, ids, wanted)
+        )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
         """Return Hessians (n, frames, 6, nv, nv) by `getFrameKinematicHessian`.
@@ -330,10 +338,10 @@ class PinocchioOracle(Oracle):
           coordinates.
         """
         pin, model, data = self._pin, self._model, self.data
-        ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv
+        ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
         out = np.zeros((len(x.q), len(ids), 6, nv, nv))
         moving = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
-        for to, q_k in zip(out, *self._inputs(x, 1), strict=True):
+        for to, q_k in zip(out, *self._convert_inputs(x, 1), strict=True):
             pin.computeJointJacobians(model, data, q_k)
             pin.computeJointKinematicHessians(model, data)
             for f, frame in moving:
@@ -352,17 +360,17 @@ class PinocchioOracle(Oracle):
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes the process for a Jacobian without columns.
         # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
-        for k, q_k in enumerate(self._inputs(x, 1)[0] if columns else ()):
+        for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
         return out
 
-    def _each(
+    def _map_configurations(
         self, function: Callable[..., Any], inputs: Sequence[FloatArray], *others: object
     ) -> Iterator[Any]:
         return map(function, repeat(self._model), repeat(self.data), *inputs, *map(repeat, others))
 
-    def _collected(
+    def _collect_results(
         self,
         shape: tuple[int, ...],
         inputs: tuple[FloatArray, ...],
@@ -372,21 +380,21 @@ class PinocchioOracle(Oracle):
         *reference: Any,
     ) -> FloatArray:
         """Return results (n, ids, *shape): call `compute` for each configuration, then `get` for each id."""
-        model, data, steps = self._model, self.data, self._each(compute, inputs)
-        return _stacked(
+        model, data, steps = self._model, self.data, self._map_configurations(compute, inputs)
+        return _stack_results(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
             *(len(inputs[0]), len(ids), *shape),
         )
 
 
-def _stacked(compute: _Next, *shape: int) -> FloatArray:
+def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
     out = np.empty(shape)
     for _ in _blocks(compute, shape[0], out):
         pass
     return out
 
 
-def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
+def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
 
     If `memory` has fewer than n rows, each block overwrites the previous block. Empty results are not
@@ -395,7 +403,7 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     if 0 in memory.shape:
         yield memory
         return
-    step, rows_of_one = _block(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
+    step, rows_of_one = _block_length(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
     # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
     rows = memory.reshape(-1, *(size for size in memory.shape[3:] if size > 1))
     for first in range(0, n, step):
@@ -405,12 +413,12 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
         yield memory[start:end]
 
 
-def _block(*shape: int) -> int:
+def _block_length(*shape: int) -> int:
     """Return how many configurations fit in a block; `shape` is the shape of one configuration's result."""
     return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
 
 
-def depth_of(tree: KinematicTree) -> int:
+def tree_depth(tree: KinematicTree) -> int:
     """Return the largest number of joints on a path from the root."""
     depths = [0]
     for joint in tree.joints:

@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     from urdfkin.verify.oracle import Oracle, QueryBatch
 
 #: Rows of a velocity, an acceleration or a Jacobian.
-SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
+SIX_VECTOR_LABELS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
     return lambda oracle, query: getattr(oracle, name)(query)
 
 
-_bound = lazy_import("urdfkin.verify.bounds:bound_of")
+_bound = lazy_import("urdfkin.verify.bounds:make_bound")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,21 +54,22 @@ class Quantity:
         shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
             frames, ...). If `recursive` is False, the arguments of `compute` may differ.
-        ask: Function (oracle, query) that returns the oracle's results (n, frames, ...).
+        ask_oracle: Function (oracle, query) that returns the oracle's results (n, frames, ...).
         blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
         scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
         factors: Largest number of factors in a term of the quantity, for LOCAL_WORLD_ALIGNED
             (`urdfkin.verify.bounds`).
-        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound. If
-            `against` is not None, the checks use `against` instead of `ask` and `scale`.
-        exact: Function (motion, link, reference) that returns intervals around the true values.
+        results_and_bound: Function (oracle, part, ours, library) that returns the oracle's results and the
+            bound. If `results_and_bound` is not None, the checks use `results_and_bound` instead of
+            `ask_oracle` and `scale`.
+        compute_intervals: Function (motion, link, reference) that returns intervals around the true values.
         recursive: True if the forward recursion computes the quantity for any list of frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. They
+        in_validation: True if `validate`, the accuracy study and plots include the quantity. They
             do not include the Hessian, because a Hessian has nv times as many numbers as a Jacobian.
-        referred: True if the quantity depends on a reference frame.
-        of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
-        head: Heading of the column in reports; several quantities may share a column.
-        page: Help text of the command, without the summary.
+        has_reference: True if the quantity depends on a reference frame.
+        object_kind: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
+        heading: Heading of the column in reports; several quantities may share a column.
+        help_text: Help text of the command, without the summary.
     """
 
     name: str
@@ -77,22 +78,22 @@ class Quantity:
     shape: tuple[int | Literal["nv"], ...]
     equations: tuple[str, ...]
     compute: Callable[..., Any]
-    ask: Callable[[Oracle, QueryBatch], FloatArray]
+    ask_oracle: Callable[[Oracle, QueryBatch], FloatArray]
     scale: Callable[..., Any]
     factors: int
     blocks: Callable[[Oracle, QueryBatch], Iterator[FloatArray]] | None = None
-    against: Callable[..., tuple[FloatArray, Bound]] | None = None
-    exact: Callable[..., Any] | None = None
+    results_and_bound: Callable[..., tuple[FloatArray, Bound]] | None = None
+    compute_intervals: Callable[..., Any] | None = None
     recursive: bool = True
-    validated: bool = True
-    referred: bool = True
-    of: Literal["frames", "joints", "columns"] = "frames"
-    head: str = ""
-    labels: tuple[str, ...] = SIX
+    in_validation: bool = True
+    has_reference: bool = True
+    object_kind: Literal["frames", "joints", "columns"] = "frames"
+    heading: str = ""
+    labels: tuple[str, ...] = SIX_VECTOR_LABELS
     units: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     summary: str = ""
-    page: str = ""
+    help_text: str = ""
     example: str = ""
 
     @property
@@ -105,36 +106,38 @@ class Quantity:
         return len(self.shape)
 
     @property
-    def columns(self) -> bool:
+    def has_columns(self) -> bool:
         return "nv" in self.shape
 
     @property
     def references(self) -> tuple[Reference | None, ...]:
         from urdfkin.model.reference import Reference
 
-        return tuple(Reference) if self.referred else (None,)
+        return tuple(Reference) if self.has_reference else (None,)
 
-    def own_shape(self, rates: int) -> tuple[int, ...]:
+    def result_shape(self, rates: int) -> tuple[int, ...]:
         return tuple(rates if size == "nv" else size for size in self.shape)
 
-    def ours(
+    def compute_results(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
+        results: FloatArray = self.compute(
+            plan, *inputs[: len(self.inputs)], *self._reference_arguments(reference), **how
+        )
         return results
 
-    def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
-        scale = self.scale(plan, size, *self._in(reference))
-        bound: Bound = _bound(scale, self.factors, size, *self._in(reference))
+    def bound(self, plan: CompiledTree, magnitudes: Magnitudes, reference: Reference | None) -> Bound:
+        scale = self.scale(plan, magnitudes, *self._reference_arguments(reference))
+        bound: Bound = _bound(scale, self.factors, magnitudes, *self._reference_arguments(reference))
         return bound
 
-    def truth(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
-        assert self.exact is not None
-        values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
+    def enclose(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
+        assert self.compute_intervals is not None
+        values: NDArray[Any] = self.compute_intervals(motion, link, *self._reference_arguments(reference))
         return values
 
-    def _in(self, reference: Reference | None) -> tuple[Reference | None, ...]:
-        return (reference,) if self.referred else ()
+    def _reference_arguments(self, reference: Reference | None) -> tuple[Reference | None, ...]:
+        return (reference,) if self.has_reference else ()
 
 
 PLACEMENT = Quantity(
@@ -144,12 +147,12 @@ PLACEMENT = Quantity(
     shape=(4, 4),
     equations=("7.77",),
     compute=lazy_import("urdfkin.compiled.evaluate:placements"),
-    ask=oracle_method("placements"),
+    ask_oracle=oracle_method("placements"),
     scale=lazy_import("urdfkin.verify.bounds:placement_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:placement_values"),
     factors=1,
-    referred=False,
-    head="place",
+    has_reference=False,
+    heading="place",
     labels=(),
     command="placement",
     summary="pose of a frame",
@@ -159,7 +162,9 @@ RELATIVE_PLACEMENT = replace(
     PLACEMENT,
     name="relative placement",
     title="placement in another frame",
-    against=partial(lazy_import("urdfkin.verify.derived:check_relative_placement"), PLACEMENT.bound),
+    results_and_bound=partial(
+        lazy_import("urdfkin.verify.derived:check_relative_placement"), PLACEMENT.bound
+    ),
     recursive=False,
     command="",
 )
@@ -170,15 +175,16 @@ VELOCITY = Quantity(
     shape=(6,),
     equations=("7.127", "7.128"),
     compute=lazy_import("urdfkin.compiled.evaluate:velocities"),
-    ask=oracle_method("velocities"),
+    ask_oracle=oracle_method("velocities"),
     scale=lazy_import("urdfkin.verify.bounds:velocity_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:velocity_values"),
     factors=2,
-    head="vel",
+    heading="vel",
     units={"linear": "m/s", "angular": "rad/s"},
     command="velocity",
     summary="velocity of a frame",
-    page="Linear velocity of the frame's origin, m/s, and angular velocity, rad/s, for joint velocities --v.",
+    help_text="Linear velocity of the frame's origin, m/s, and angular velocity, rad/s, for joint"
+    " velocities --v.",
     example="urdfkin velocity ur5 --q random --v 1,0,0,0,0,0 --frame tool0",
 )
 JACOBIAN = Quantity(
@@ -188,15 +194,16 @@ JACOBIAN = Quantity(
     shape=(6, "nv"),
     equations=("7.85",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobians"),
-    ask=oracle_method("jacobians"),
+    ask_oracle=oracle_method("jacobians"),
     blocks=oracle_method("jacobian_blocks"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:jacobian_values"),
     factors=2,
-    head="J",
+    heading="J",
     command="jacobian",
     summary="Jacobian of a frame",
-    page="Each row of the table is the frame's velocity when one joint velocity is 1 and all others are 0.",
+    help_text="Each row of the table is the frame's velocity when one joint velocity is 1 and all others"
+    " are 0.",
     example="urdfkin jacobian panda --q random --seed 1 --frame panda_hand",
 )
 JACOBIAN_RATE = Quantity(
@@ -206,16 +213,16 @@ JACOBIAN_RATE = Quantity(
     shape=(6, "nv"),
     equations=("7.126",),
     compute=lazy_import("urdfkin.compiled.evaluate:jacobian_rates"),
-    ask=oracle_method("jacobian_rates"),
+    ask_oracle=oracle_method("jacobian_rates"),
     scale=lazy_import("urdfkin.verify.bounds:jacobian_rate_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:jacobian_rate_values"),
     factors=3,
-    head="J-dot",
+    heading="J-dot",
     command="jacobian-rate",
     summary="time derivative of a frame's Jacobian",
-    page="Time derivative J' for joint velocities --v. The table has a row for each column of the Jacobian."
-    " In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and world,"
-    " J a + J' v is the spatial acceleration.",
+    help_text="Time derivative J' for joint velocities --v. The table has a row for each column of the"
+    " Jacobian. In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and"
+    " world, J a + J' v is the spatial acceleration.",
     example="urdfkin jacobian-rate panda --q random --v random --frame panda_hand",
 )
 HESSIAN = Quantity(
@@ -225,17 +232,17 @@ HESSIAN = Quantity(
     shape=(6, "nv", "nv"),
     equations=("7.85", "7.126"),
     compute=lazy_import("urdfkin.compiled.evaluate:hessians"),
-    ask=oracle_method("hessians"),
+    ask_oracle=oracle_method("hessians"),
     scale=lazy_import("urdfkin.verify.bounds:hessian_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:hessian_values"),
     factors=3,
-    validated=False,
-    head="H",
+    in_validation=False,
+    heading="H",
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
-    page="The table has a group of rows for each column of the Jacobian. Each row is the derivative of the"
-    " column by one joint coordinate. The sum of the rows of a group, each multiplied by the velocity of its"
-    " joint, is a row of `urdfkin jacobian-rate`.",
+    help_text="The table has a group of rows for each column of the Jacobian. Each row is the derivative of"
+    " the column by one joint coordinate. The sum of the rows of a group, each multiplied by the velocity"
+    " of its joint, is a row of `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(
@@ -245,17 +252,17 @@ ACCELERATION = Quantity(
     shape=(6,),
     equations=("7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:accelerations"),
-    ask=oracle_method("accelerations"),
+    ask_oracle=oracle_method("accelerations"),
     scale=lazy_import("urdfkin.verify.bounds:acceleration_scale"),
-    exact=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
+    compute_intervals=lazy_import("urdfkin.verify.exact.recursion:acceleration_values"),
     factors=3,
-    head="acc",
+    heading="acc",
     units={"linear": "m/s^2", "angular": "rad/s^2"},
     command="acceleration",
     summary="classical acceleration of a frame",
-    page="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration, rad/s^2,"
-    " for joint velocities --v and joint accelerations --a. Gravity is not included. --breakdown lists the"
-    " transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
+    help_text="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration,"
+    " rad/s^2, for joint velocities --v and joint accelerations --a. Gravity is not included. --breakdown"
+    " lists the transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
     f" {QuestionsSection.TWO_ACCELERATIONS}, {QuestionsSection.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --breakdown",
 )
@@ -266,9 +273,11 @@ ANALYTICAL_JACOBIAN = replace(
     blocks=None,
     equations=("7.118", "7.122"),
     compute=lazy_import("urdfkin.kinematics.bodies:analytical_jacobian"),
-    against=partial(lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound),
+    results_and_bound=partial(
+        lazy_import("urdfkin.verify.derived:check_analytical_jacobian"), JACOBIAN.bound
+    ),
     recursive=False,
-    referred=False,
+    has_reference=False,
     command="",
 )
 ACCELERATION_BREAKDOWN = replace(
@@ -286,26 +295,26 @@ IMU = replace(
     title="IMU reading",
     equations=("7.127", "7.129", "7.130"),
     compute=lazy_import("urdfkin.compiled.evaluate:imus"),
-    against=lazy_import("urdfkin.verify.derived:check_imu"),
+    results_and_bound=lazy_import("urdfkin.verify.derived:check_imu"),
     recursive=False,
-    referred=False,
+    has_reference=False,
     labels=("ax", "ay", "az", "wx", "wy", "wz"),
     units={"proper acceleration": "m/s^2", "angular velocity": "rad/s"},
     command="",
 )
-JOINT_JACOBIAN = replace(JACOBIAN, name="joint jacobian", title="joint Jacobian", of="joints")
+JOINT_JACOBIAN = replace(JACOBIAN, name="joint jacobian", title="joint Jacobian", object_kind="joints")
 JOINT_JACOBIAN_RATE = replace(
-    JACOBIAN_RATE, name="joint jacobian rate", title="joint Jacobian rate", of="joints"
+    JACOBIAN_RATE, name="joint jacobian rate", title="joint Jacobian rate", object_kind="joints"
 )
 SCREWS = replace(
     JACOBIAN,
     name="screws",
     title="data.J",
     shape=(6,),
-    ask=oracle_method("screws"),
+    ask_oracle=oracle_method("screws"),
     blocks=None,
-    of="columns",
-    head="data.J",
+    object_kind="columns",
+    heading="data.J",
 )
 
 #: All quantities, in the order of certificates and reports.
@@ -330,32 +339,36 @@ QUANTITIES = {
 
 
 def recursive_quantities(of: str = "frames") -> list[Quantity]:
-    return [row for row in QUANTITIES.values() if row.recursive and row.of == of]
+    return [row for row in QUANTITIES.values() if row.recursive and row.object_kind == of]
 
 
-def validated(of: str = "frames") -> list[Quantity]:
-    return [row for row in recursive_quantities(of) if row.validated]
+def validated_quantities(of: str = "frames") -> list[Quantity]:
+    return [row for row in recursive_quantities(of) if row.in_validation]
 
 
-def compared() -> str:
-    return _listed([row.title for row in validated()])
+def compared_titles() -> str:
+    return _join_titles([row.title for row in validated_quantities()])
 
 
-def not_compared() -> str:
-    return _listed(
-        [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
+def uncompared_titles() -> str:
+    return _join_titles(
+        [
+            row.title
+            for row in QUANTITIES.values()
+            if row.object_kind == "frames" and row not in validated_quantities()
+        ]
     )
 
 
-def _listed(titles: Sequence[str]) -> str:
+def _join_titles(titles: Sequence[str]) -> str:
     return f"{', '.join(titles[:-1])} and {titles[-1]}"
 
 
-def by_command() -> dict[str, Quantity]:
+def quantities_by_command() -> dict[str, Quantity]:
     return {row.command: row for row in recursive_quantities() if row.command}
 
 
-def quantity(name: str) -> Quantity:
+def find_quantity(name: str) -> Quantity:
     """Return the quantity with a name; raise UnknownNameError with the nearest names."""
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)

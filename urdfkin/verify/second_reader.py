@@ -26,7 +26,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.plain_xml import parse_xml
-from urdfkin.verify.oracle import resolved_rules
+from urdfkin.verify.oracle import resolve_rules
 
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
@@ -34,16 +34,16 @@ if TYPE_CHECKING:
 #: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
 #: A sine and a cosine have an error of one eps each.
 #: Two products and a sum of at most 1 have an error of half an eps each.
-_ROTATION = 9.0 * EPS
+_ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference of a component of an axis that two programs normalise.
 #: The length has an error of 2 eps, and the quotient is rounded once.
-_AXIS = 5.0 * EPS
+_AXIS_TOLERANCE = 5.0 * EPS
 #: An axis is normalised if its length differs from 1 by at most this number.
-_UNIT = 1e-6
-_LISTED = 8
-_QUOTED = 200
+_UNIT_TOLERANCE = 1e-6
+_MAX_DIFFERENCES = 8
+_MAX_QUOTE_LENGTH = 200
 #: Kinds of joints that have position limits in the URDF specification.
-_BOUNDED = ("revolute", "prismatic")
+_BOUNDED_KINDS = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
 
@@ -64,7 +64,7 @@ class SecondReading:
     unread: str | None = None
 
 
-def second_reading(
+def compare_with_yourdfpy(
     text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
@@ -77,10 +77,12 @@ def second_reading(
     if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type declaration")
     try:
-        robot = read(text)
+        robot = read_with_yourdfpy(text)
     except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
         words = " ".join(str(error).split()) or "no message"
-        return SecondReading(by, unread=escape_unprintable(f"{type(error).__name__}: {words}")[:_QUOTED])
+        return SecondReading(
+            by, unread=escape_unprintable(f"{type(error).__name__}: {words}")[:_MAX_QUOTE_LENGTH]
+        )
     ours = {
         joint.name: (joint.original, tree.links[joint.parent], tree.links[i + 1])
         for i, joint in enumerate(tree.joints)
@@ -88,24 +90,24 @@ def second_reading(
     }
     theirs = {joint.name: joint for joint in robot.joints}
     differences = [
-        *_names("link", tree.links[int(root_joint) :], [link.name for link in robot.links]),
-        *_names("joint", ours, [joint.name for joint in robot.joints]),
+        *_compare_names("link", tree.links[int(root_joint) :], [link.name for link in robot.links]),
+        *_compare_names("joint", ours, [joint.name for joint in robot.joints]),
     ]
-    rules = _rules(theirs, ours) if mimic else {}
-    quaternions, faults = _quaternions(text), dict[str, list[str]]()
+    rules = _read_mimic_rules(theirs, ours) if mimic else {}
+    quaternions, faults = _find_quaternion_joints(text), dict[str, list[str]]()
     for name in ours.keys() & theirs.keys():
-        for what, fault in _differences(ours[name], theirs[name], rules.get(name), mimic=mimic):
+        for what, fault in _compare_joints(ours[name], theirs[name], rules.get(name), mimic=mimic):
             if what == "rotation" and name in quaternions:
                 faults.setdefault("ignores quat_xyzw", []).append(name)
             elif fault:
                 faults.setdefault(fault, []).append(name)
             else:
                 differences.append(f"joint {name}: {what}")
-    known = [f"{fault}: {', '.join(_shortened(sorted(names)))}" for fault, names in sorted(faults.items())]
-    return SecondReading(by, len(ours), tuple(_shortened(sorted(differences))), tuple(known))
+    known = [f"{fault}: {', '.join(_shorten(sorted(names)))}" for fault, names in sorted(faults.items())]
+    return SecondReading(by, len(ours), tuple(_shorten(sorted(differences))), tuple(known))
 
 
-def read(text: str) -> yourdf.Robot:
+def read_with_yourdfpy(text: str) -> yourdf.Robot:
     """Read a URDF text with yourdfpy, without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
@@ -120,7 +122,7 @@ def read(text: str) -> yourdf.Robot:
     return model.robot
 
 
-def _differences(
+def _compare_joints(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
     """Yield two texts for each difference between urdfkin's joint and yourdfpy's joint.
@@ -136,35 +138,35 @@ def _differences(
     T = np.eye(4) if theirs.origin is None else np.asarray(theirs.origin, dtype=np.float64)
     if not (T[:3, 3] == joint.T_parent_joint[:3, 3]).all():
         yield f"origin at {T[:3, 3].tolist()}, not {joint.T_parent_joint[:3, 3].tolist()}", ""
-    if not (np.abs(T - joint.T_parent_joint)[:3, :3] <= _ROTATION).all():
+    if not (np.abs(T - joint.T_parent_joint)[:3, :3] <= _ROTATION_TOLERANCE).all():
         yield "rotation", ""
     if joint.kind.has_axis:
         length = math.hypot(*theirs.axis)
-        if not (np.abs(theirs.axis / length - joint.axis) <= _AXIS).all():
+        if not (np.abs(theirs.axis / length - joint.axis) <= _AXIS_TOLERANCE).all():
             yield f"axis {theirs.axis.tolist()}, not {joint.axis.tolist()}", ""
-        elif abs(length - 1.0) > _UNIT:
+        elif abs(length - 1.0) > _UNIT_TOLERANCE:
             yield "axis", "does not normalise an axis"
     if joint.kind is not JointKind.FIXED:
         limit = joint.limit and {x: getattr(joint.limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
-        if (found := _limit(theirs)) != limit:
+        if (found := _read_limit(theirs)) != limit:
             yield f"limit {found}, not {limit}", ""
     if mimic and rule != joint.mimic:
         yield f"mimic rule {rule}, not {joint.mimic}", ""
 
 
-def _limit(joint: yourdf.Joint) -> dict[str, float] | None:
+def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
     """Return yourdfpy's limit, with the specification's default for a missing number."""
     if joint.limit is None:
         return None
-    bounded = joint.type in _BOUNDED
+    bounded = joint.type in _BOUNDED_KINDS
     bounds = {x: (getattr(joint.limit, x) or 0.0) if bounded else None for x in _LOWER_UPPER}
     others = {x: getattr(joint.limit, x) for x in _VELOCITY_EFFORT}
     endless = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
     return {x: endless[x] if value is None else value for x, value in {**bounds, **others}.items()}
 
 
-def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
-    return resolved_rules(
+def _read_mimic_rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
+    return resolve_rules(
         {
             name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
             for name, joint in theirs.items()
@@ -173,7 +175,7 @@ def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> di
     )
 
 
-def _quaternions(text: str) -> set[str]:
+def _find_quaternion_joints(text: str) -> set[str]:
     """Return the names of the joints whose origin has the attribute quat_xyzw."""
     if "quat_xyzw" not in text:
         return set()
@@ -184,13 +186,13 @@ def _quaternions(text: str) -> set[str]:
     }
 
 
-def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
+def _compare_names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:
             yield f"{what} {name}: yourdfpy finds {found[name]}, urdfkin finds {own[name]}"
 
 
-def _shortened(differences: list[str]) -> list[str]:
-    more = len(differences) - _LISTED
-    return differences if more <= 0 else [*differences[:_LISTED], f"{more} more"]
+def _shorten(differences: list[str]) -> list[str]:
+    more = len(differences) - _MAX_DIFFERENCES
+    return differences if more <= 0 else [*differences[:_MAX_DIFFERENCES], f"{more} more"]

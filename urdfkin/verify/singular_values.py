@@ -30,15 +30,15 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.singularity import FrameColumns, Singularity, explain
+from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
 #: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
-_OUTWARD = 256.0 * EPS
+_RELATIVE_ERROR = 256.0 * EPS
 #: Maximum number of samples of a batch in the printed table.
-_SHOWN = 10
+_MAX_ROWS = 10
 
 
-class Between(NamedTuple):
+class BoundedArray(NamedTuple):
     """A computed value and guaranteed bounds on the true value, as three arrays of the same shape."""
 
     value: FloatArray
@@ -58,8 +58,8 @@ class SingularValues(Displayable):
             columns.
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
         V: (..., nv, k) right singular vectors, directions of v; 0 for a joint that does not move the frame.
-        columns: The Jacobian with the names of the frame and of the joints; None if the matrix is not a
-            robot's Jacobian.
+        frame_jacobian: The Jacobian with the names of the frame and of the joints; None if the matrix is not
+            a robot's Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -69,10 +69,10 @@ class SingularValues(Displayable):
     """
 
     rows: slice
-    values: Between
+    values: BoundedArray
     U: FloatArray
     V: FloatArray
-    columns: FrameColumns | None = None
+    frame_jacobian: FrameJacobian | None = None
 
     def __repr__(self) -> str:
         batch = f", {self.values.value.shape[:-1]}" if self.values.value.ndim > 1 else ""
@@ -80,7 +80,7 @@ class SingularValues(Displayable):
 
     def _title(self) -> str:
         rows = {3: "angular"}.get(self.rows.start, "linear" if self.rows.stop == len("xyz") else "all")
-        return "" if self.columns is None else f" of {self.columns.frame}, {rows} rows"
+        return "" if self.frame_jacobian is None else f" of {self.frame_jacobian.frame}, {rows} rows"
 
     def _text_document(self) -> TextDocument:
         title = f"Singular values{self._title()}"
@@ -97,14 +97,14 @@ class SingularValues(Displayable):
                 )
             ]
             heads = ["sample", *names, "condition", "manipulability", "rank"]
-            rest = len(rows) - _SHOWN
+            rest = len(rows) - _MAX_ROWS
             more = [f"... and {rest} more samples"] if rest > 0 else []
-            return TextDocument(title, [Table(heads, rows[:_SHOWN]), *more])
+            return TextDocument(title, [Table(heads, rows[:_MAX_ROWS]), *more])
         lines = [[name, *(f"{side[i]:.15g}" for side in self.values)] for i, name in enumerate(names)]
         for name, between in (("condition", self.condition), ("manipulability", self.manipulability)):
             lines.append([name, *(f"{side:.15g}" for side in between)])
         table = Table(["", "value", "lower bound", "upper bound"], lines)
-        found = self.singularity() if self.columns is not None else None
+        found = self.singularity() if self.frame_jacobian is not None else None
         return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
 
     def singularity(self, *sample: int) -> Singularity:
@@ -125,13 +125,13 @@ class SingularValues(Displayable):
         """
         shape = self.values.value.shape[:-1]
         inside = len(sample) == len(shape) and all(-n <= i < n for i, n in zip(sample, shape, strict=True))
-        if not inside or self.columns is None:
+        if not inside or self.frame_jacobian is None:
             raise InputError("no such configuration", found=str(sample), where=f"a batch of shape {shape}")
         bounds = self.values.lower[sample], self.values.upper[sample]
-        return explain(self.columns, sample, self.rows, *bounds)
+        return explain_singularity(self.frame_jacobian, sample, self.rows, *bounds)
 
     @cached_property
-    def manipulability(self) -> Between:
+    def manipulability(self) -> BoundedArray:
         """Product of the singular values, (...): Yoshikawa's manipulability sqrt(det J J^T).
 
         If J has more rows than columns, the manipulability is sqrt(det J^T J).
@@ -144,12 +144,12 @@ class SingularValues(Displayable):
         """
         if not self.values.value.shape[-1]:
             nothing = np.zeros(self.values.value.shape[:-1])
-            return Between(nothing, nothing, nothing)
+            return BoundedArray(nothing, nothing, nothing)
         value, lower, upper = map(_product, self.values)
-        return Between(value, np.maximum(_down(lower), 0.0), _up(upper))
+        return BoundedArray(value, np.maximum(_round_down(lower), 0.0), _round_up(upper))
 
     @cached_property
-    def condition(self) -> Between:
+    def condition(self) -> BoundedArray:
         """Condition number (...): the largest singular value divided by the smallest.
 
         If the lower bound on the smallest singular value is 0, the upper bound on the condition number is
@@ -164,7 +164,7 @@ class SingularValues(Displayable):
         value, lower, upper = self.values
         if not value.shape[-1]:
             nothing = np.full(value.shape[:-1], np.nan)
-            return Between(nothing, nothing, nothing)
+            return BoundedArray(nothing, nothing, nothing)
         with np.errstate(divide="ignore", over="ignore", under="ignore", invalid="ignore"):
             least, middle, most = (
                 np.where(small > 0.0, large / small, np.inf)
@@ -174,7 +174,7 @@ class SingularValues(Displayable):
                     (upper[..., 0], lower[..., -1]),
                 )
             )
-        return Between(middle, np.maximum(_down(least), 1.0), _up(most))
+        return BoundedArray(middle, np.maximum(_round_down(least), 1.0), _round_up(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
@@ -212,7 +212,7 @@ def singular_values(
     error: FloatArray,
     moving: NDArray[np.bool_],
     rows: slice = slice(None),
-    columns: FrameColumns | None = None,
+    columns: FrameJacobian | None = None,
 ) -> SingularValues:
     """Return the singular values of some rows of finite matrices J (..., m, nv), with guaranteed bounds.
 
@@ -232,15 +232,18 @@ def singular_values(
         left = np.abs(A - (U * s[..., np.newaxis, :]) @ Vt)
         sizes = np.abs(A) + (np.abs(U) * s[..., np.newaxis, :]) @ np.abs(Vt)
         residual = _norm(left + terms * (EPS * sizes + SMALLEST_NORMAL) + off)
-        skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
-        lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
-        upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
+        skew = _orthogonality_error(U) + _orthogonality_error(Vt.swapaxes(-1, -2))
+        lower = s * _round_down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
+        upper = s * _round_up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
     # A lower bound of NaN becomes 0, and an upper bound of NaN becomes inf.
-    lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
-    return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
+    lower, upper = (
+        np.nan_to_num(_round_down(lower), nan=0.0),
+        np.nan_to_num(_round_up(upper), nan=np.inf, posinf=np.inf),
+    )
+    return SingularValues(rows, BoundedArray(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
 
-def _skew(U: FloatArray) -> FloatArray:
+def _orthogonality_error(U: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm |U^T U - I| for U (..., m, k)."""
     back = U.swapaxes(-1, -2)
     rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
@@ -254,7 +257,7 @@ def _norm(E: FloatArray) -> FloatArray:
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
-    return _up(norm)
+    return _round_up(norm)
 
 
 def _product(x: FloatArray) -> FloatArray:
@@ -265,14 +268,14 @@ def _product(x: FloatArray) -> FloatArray:
     return product
 
 
-def _up(x: FloatArray) -> FloatArray:
+def _round_up(x: FloatArray) -> FloatArray:
     """Return an upper bound on the exact number whose rounded value is `x`."""
     with np.errstate(over="ignore", under="ignore"):
-        return np.nextafter(x + np.abs(x) * _OUTWARD, np.inf)
+        return np.nextafter(x + np.abs(x) * _RELATIVE_ERROR, np.inf)
 
 
-def _down(x: FloatArray) -> FloatArray:
+def _round_down(x: FloatArray) -> FloatArray:
     """Return a lower bound on the exact number whose rounded value is `x`; for inf, the largest double."""
     with np.errstate(under="ignore", invalid="ignore"):
-        inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
+        inside = np.nextafter(x - np.abs(x) * _RELATIVE_ERROR, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

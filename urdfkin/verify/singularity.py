@@ -26,9 +26,9 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
 #: The search finds minimal sets of linearly dependent columns, with up to this number of columns.
-_LARGEST_SET = 4
+_MAX_SET_SIZE = 4
 #: The search is skipped for a Jacobian with more columns than this number.
-_MOST_COLUMNS = 16
+_MAX_COLUMNS = 16
 #: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
 #: At random configurations, a singular value below this fraction of the norm counts as 0.
@@ -36,31 +36,31 @@ _NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class FrameColumns:
+class FrameJacobian:
     """A robot's Jacobian, with the names of its frame and of its joints.
 
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
         error: (..., 6, nv) bound on the error of each number of J.
-        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint, None
-            for a column that does not belong to a single joint axis.
-        active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
-        samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
+        is_revolute: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint,
+            None for a column that does not belong to a single joint axis.
+        active_entries: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
         moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
-            `samples`, which have a fixed base.
+            `sample_jacobians`, which have a fixed base.
     """
 
     J: FloatArray
     error: FloatArray
     frame: str
     joints: tuple[str, ...]
-    turns: tuple[bool | None, ...]
-    active: NDArray[np.bool_]
-    samples: Callable[[], FloatArray]
+    is_revolute: tuple[bool | None, ...]
+    active_entries: NDArray[np.bool_]
+    sample_jacobians: Callable[[], FloatArray]
     moving_base: bool
 
 
-def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
+def find_revolute_columns(tree: KinematicTree) -> tuple[bool | None, ...]:
     turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
@@ -76,44 +76,44 @@ class Singularity(Displayable):
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full: Largest possible rank: the smaller of the numbers of rows and columns.
-        least: Upper bound on the smallest singular value.
-        lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
-            Jacobian has more rows than columns.
-        motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
+        full_rank: Largest possible rank: the smaller of the numbers of rows and columns.
+        smallest_value_bound: Upper bound on the smallest singular value.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty
+            if the Jacobian has more rows than columns.
+        null_motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons of the loss.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
     >>> found = arm.singular_values([0.0, 0.0], "tip", "linear").singularity()
-    >>> found.rank, found.full, found.lost.tolist()
+    >>> found.rank, found.full_rank, found.lost_directions.tolist()
     (1, 2, [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
     """
 
     rank: int
-    full: int
-    least: float
-    lost: FloatArray
-    motions: FloatArray
+    full_rank: int
+    smallest_value_bound: float
+    lost_directions: FloatArray
+    null_motions: FloatArray
     reasons: tuple[str, ...]
 
     def __bool__(self) -> bool:
         """Whether the Jacobian is singular within rounding."""
-        return self.rank < self.full
+        return self.rank < self.full_rank
 
     def __repr__(self) -> str:
-        return f"<Singularity: rank {self.rank} of {self.full}>"
+        return f"<Singularity: rank {self.rank} of {self.full_rank}>"
 
     def _text_document(self) -> TextDocument:
-        title = f"rank {self.rank} of {self.full}"
+        title = f"rank {self.rank} of {self.full_rank}"
         if not self:
             return TextDocument(f"Not singular: {title}.")
-        where = f"sigma_{self.full} is at most {self.least:.2g}"
+        where = f"sigma_{self.full_rank} is at most {self.smallest_value_bound:.2g}"
         return TextDocument(f"Singular within rounding: {title}; {where}.", self.reasons)
 
 
-def explain(
-    columns: FrameColumns, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
+def explain_singularity(
+    columns: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
     """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
@@ -127,32 +127,32 @@ def explain(
 
 
 class _Explanation:
-    def __init__(self, columns: FrameColumns, sample: tuple[int, ...], rows: slice, rank: int) -> None:
+    def __init__(self, columns: FrameJacobian, sample: tuple[int, ...], rows: slice, rank: int) -> None:
         J, error = columns.J[sample], columns.error[sample]
         chosen = np.zeros(6, dtype=bool)
         chosen[rows] = True
         self._linear_only, self._angular_only = not chosen[3:].any(), not chosen[:3].any()
-        active = columns.active & chosen[:, None]
+        active = columns.active_entries & chosen[:, None]
         self._rows, self._moving = np.flatnonzero(active.any(axis=1)), np.flatnonzero(active.any(axis=0))
         self._J, self._error, self._columns, self._rank = J, error, columns, rank
         self._A = J[np.ix_(self._rows, self._moving)]
-        self._off = error[np.ix_(self._rows, self._moving)]
+        self._A_error = error[np.ix_(self._rows, self._moving)]
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
-        motions[:, self._moving] = _sparse(Vt[self._rank :])
-        usual, never = self._of_samples()
+        motions[:, self._moving] = _sparse_basis(Vt[self._rank :])
+        usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
-        directions = _basis(directions - directions @ never @ never.T)
+        directions = _orthonormal_basis(directions - directions @ never @ never.T)
         # For an arm with fewer joints than Jacobian rows, the directions without motion depend on the
         # configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
-            lost[:, self._rows] = _sparse(directions)
+            lost[:, self._rows] = _sparse_basis(directions)
             lost /= np.linalg.norm(lost, axis=1, keepdims=True)
             first = np.abs(lost).argmax(axis=1)[:, None]
             lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
@@ -161,23 +161,23 @@ class _Explanation:
                 "Random configurations have the same rank, so the arm is the cause, not this configuration."
             ]
         else:
-            reasons = [*self._directions(lost), *self._causes(lost, motions)]
+            reasons = [*self._describe_directions(lost), *self._describe_causes(lost, motions)]
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
-    def _of_samples(self) -> tuple[int, FloatArray]:
+    def _compare_samples(self) -> tuple[int, FloatArray]:
         """Return the rank at random configurations, and a basis of the directions lost in all of them."""
-        samples = self._columns.samples()[:, self._rows[:, None], self._moving]
+        samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return usual, U[:, int((s > _NEGLIGIBLE * s[0]).sum()) :]
 
-    def _without_noise(self, rows: FloatArray) -> FloatArray:
+    def _remove_noise(self, rows: FloatArray) -> FloatArray:
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
-    def _directions(self, lost: FloatArray) -> Iterator[str]:
+    def _describe_directions(self, lost: FloatArray) -> Iterator[str]:
         frame = self._columns.frame
-        for u in self._without_noise(lost):
-            linear, angular = _vector(u[:3]), _vector(u[3:])
+        for u in self._remove_noise(lost):
+            linear, angular = _format_vector(u[:3]), _format_vector(u[3:])
             if not u[3:].any():
                 yield f"Lost direction: translation of the origin of {frame} along {linear}, in world axes."
             elif not u[:3].any():
@@ -186,35 +186,35 @@ class _Explanation:
                 at = f"at the origin of {frame} in world axes"
                 yield f"Lost direction: linear {linear}, angular {angular}, {at}."
 
-    def _causes(self, lost: FloatArray, motions: FloatArray) -> Iterator[str]:
-        if sets := list(self._dependent_sets()):
-            yield from map(self._reason, self._joined(sets))
+    def _describe_causes(self, lost: FloatArray, motions: FloatArray) -> Iterator[str]:
+        if sets := list(self._find_dependent_sets()):
+            yield from map(self._describe_dependence, self._merge_pairs(sets))
             return
-        if len(lost) == 1 and (line := self._line(self._without_noise(lost)[0])) is not None:
+        if len(lost) == 1 and (line := self._describe_common_line(self._remove_noise(lost)[0])) is not None:
             yield line
         if len(motions) == 1:
-            yield self._null_motion(motions[0, self._moving])
+            yield self._describe_null_motion(motions[0, self._moving])
         else:
-            moved = np.flatnonzero(self._without_noise(motions)[:, self._moving].any(axis=0))
-            joints = _listed([self._names[i] for i in moved])
+            moved = np.flatnonzero(self._remove_noise(motions)[:, self._moving].any(axis=0))
+            joints = _join_names([self._names[i] for i in moved])
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
-    def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
+    def _find_dependent_sets(self) -> Iterator[tuple[int, ...]]:
         """Yield each minimal set of linearly dependent columns, as column indices of `self._A`."""
-        if self._A.shape[1] > _MOST_COLUMNS:
+        if self._A.shape[1] > _MAX_COLUMNS:
             return
         found: list[set[int]] = []
-        for size in range(1, min(_LARGEST_SET, *self._A.shape) + 1):
+        for size in range(1, min(_MAX_SET_SIZE, *self._A.shape) + 1):
             for one in combinations(range(self._A.shape[1]), size):
                 if any(smaller <= set(one) for smaller in found):
                     continue
-                columns, off = self._A[:, one], self._off[:, one]
+                columns, off = self._A[:, one], self._A_error[:, one]
                 least = np.linalg.svd(columns, compute_uv=False)[-1]
-                if least <= np.linalg.norm(off) + self._rounding(columns):
+                if least <= np.linalg.norm(off) + self._rounding_error(columns):
                     found.append(set(one))
                     yield one
 
-    def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    def _merge_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Replace overlapping pairs of dependent columns by their union."""
         joined: list[set[int]] = []
         if self._linear_only:
@@ -224,45 +224,47 @@ class _Explanation:
             joined = [one for one in joined if not one & pair] + [pair.union(*overlapping)]
         return [*(tuple(sorted(one)) for one in joined), *(one for one in sets if len(one) != 2)]
 
-    def _reason(self, one: tuple[int, ...]) -> str:
+    def _describe_dependence(self, one: tuple[int, ...]) -> str:
         indices = self._moving[list(one)]
-        turns = [self._columns.turns[i] for i in indices]
+        turns = [self._columns.is_revolute[i] for i in indices]
         reason = None
         if None not in turns:
             if self._angular_only:
                 parallel = np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1
-                reason = f"The axes of {self._joints(one)} are parallel{'' if parallel else ' to one plane'}."
+                reason = (
+                    f"The axes of {self._name_joints(one)} are parallel{'' if parallel else ' to one plane'}."
+                )
             elif self._linear_only:
-                reason = self._of_linear_rows(one, turns)
+                reason = self._describe_linear_rows(one, turns)
             elif all(turns):
-                reason = self._of_revolute_axes(one)
+                reason = self._describe_revolute_axes(one)
             elif not any(turns) and np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1:
-                reason = f"{self._joints(one)} slide along parallel axes."
+                reason = f"{self._name_joints(one)} slide along parallel axes."
         if reason is not None:
             return reason
         _, _, Vt = np.linalg.svd(self._A[:, one])
         motion = np.zeros(len(self._names))
         motion[list(one)] = Vt[-1]
-        return self._null_motion(motion)
+        return self._describe_null_motion(motion)
 
-    def _of_linear_rows(self, one: tuple[int, ...], turns: list[bool | None]) -> str | None:
+    def _describe_linear_rows(self, one: tuple[int, ...], turns: list[bool | None]) -> str | None:
         frame = self._columns.frame
         if len(one) == 1 and turns[0]:
-            return f"The axis of {self._joints(one)} passes through the origin of {frame}."
+            return f"The axis of {self._name_joints(one)} passes through the origin of {frame}."
         if len(one) == 2 and all(turns):
-            return f"The axes of {self._joints(one)} lie in one plane with the origin of {frame}."
+            return f"The axes of {self._name_joints(one)} lie in one plane with the origin of {frame}."
         if len(one) == 3:
-            return f"{self._joints(one)} move the origin of {frame} in one plane only."
+            return f"{self._name_joints(one)} move the origin of {frame} in one plane only."
         return None
 
-    def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
+    def _describe_revolute_axes(self, one: tuple[int, ...]) -> str | None:
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
         off = 2.0 * float(np.linalg.norm(self._error[:, indices])) * size
-        off += self._rounding(self._J[:, indices]) * size
+        off += self._rounding_error(self._J[:, indices]) * size
         parallel = bool((np.linalg.norm(np.cross(z[:1], z), axis=1) <= off).all())
-        axes = f"The axes of {self._joints(one)}"
+        axes = f"The axes of {self._name_joints(one)}"
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
@@ -277,22 +279,22 @@ class _Explanation:
             return None
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
-    def _line(self, u: FloatArray) -> str | None:
+    def _describe_common_line(self, u: FloatArray) -> str | None:
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
-        if not all(self._columns.turns[i] for i in self._moving):
+        if not all(self._columns.is_revolute[i] for i in self._moving):
             return None
         off = 4.0 * self._matrix_error() * (1.0 + np.abs(self._A).max())
         if abs(f @ m) > off * float(f @ f):
             return None
         point = np.cross(f, m) / (f @ f)
         return (
-            f"Each axis intersects or is parallel to the line along {_vector(f / np.linalg.norm(f))} through"
-            f" the point at {_vector(point)} m from the origin of {self._columns.frame}."
+            f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))}"
+            f" through the point at {_format_vector(point)} m from the origin of {self._columns.frame}."
         )
 
-    def _null_motion(self, motion: FloatArray) -> str:
+    def _describe_null_motion(self, motion: FloatArray) -> str:
         motion = motion / motion[np.argmax(np.abs(motion))]
         parts = [
             f"{name} {format_number(float(x))}"
@@ -301,19 +303,19 @@ class _Explanation:
         ]
         return f"These joint velocities do not move {self._columns.frame}: {', '.join(parts)}."
 
-    def _joints(self, one: Sequence[int]) -> str:
-        names = _listed([self._names[i] for i in one])
+    def _name_joints(self, one: Sequence[int]) -> str:
+        names = _join_names([self._names[i] for i in one])
         return f"{'joint' if len(one) == 1 else 'joints'} {names}"
 
     def _matrix_error(self) -> float:
-        return float(np.linalg.norm(self._off)) + self._rounding(self._A)
+        return float(np.linalg.norm(self._A_error)) + self._rounding_error(self._A)
 
     @staticmethod
-    def _rounding(A: FloatArray) -> float:
+    def _rounding_error(A: FloatArray) -> float:
         return float(_ROUNDINGS * sum(A.shape) * EPS * np.linalg.norm(A))
 
 
-def _sparse(rows: FloatArray) -> FloatArray:
+def _sparse_basis(rows: FloatArray) -> FloatArray:
     """Return a basis with many zeros for the space that the rows span."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
@@ -327,15 +329,15 @@ def _sparse(rows: FloatArray) -> FloatArray:
     return basis
 
 
-def _basis(rows: FloatArray) -> FloatArray:
+def _orthonormal_basis(rows: FloatArray) -> FloatArray:
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     # Each singular value is 1 or 0, except for rounding.
     return Vt[: int((s > 0.5).sum())]
 
 
-def _vector(x: FloatArray) -> str:
+def _format_vector(x: FloatArray) -> str:
     return f"({', '.join(format_number(value, 1e-12, 4) for value in x.tolist())})"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -17,9 +17,9 @@ that are close to a multiple of 15 degrees. If snapping has changed a table, the
 effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
 the length of the path from the root to the table's base plus the length of the path from the root to the tip.
 Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum instead of the reach, but at most `PROMISED` times the reach. In a table with
-Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic rules. The
-bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
+reach, the bound uses this sum instead of the reach, but at most `MAX_LENGTH_RATIO` times the reach. In a
+table with Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic
+rules. The bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -47,7 +47,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
-PROMISED = 10.0
+MAX_LENGTH_RATIO = 10.0
 
 
 class TableError(UrdfkinError):
@@ -69,10 +69,10 @@ class TableCheck:
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
-            quantity's scale. The scale is computed from `Sizes`; the scale of an angle is 1.
-        shares: Ratio of the difference to its bound, for the same three quantities. A ratio above 1 is a
-            disagreement, unless `loss` explains the difference.
-        snapped: Whether snapping changed the table. The bound then includes the effect of snapping.
+            quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
+        shares_of_bound: Ratio of the difference to its bound, for the same three quantities. A ratio above 1
+            is a disagreement, unless `loss` explains the difference.
+        has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
         loss: Explanation of a difference above the bound, if very large lengths in the table cause the
             difference. Otherwise None.
     """
@@ -81,17 +81,17 @@ class TableCheck:
     metres: float
     radians: float
     units: dict[str, float]
-    shares: dict[str, float]
-    snapped: bool
+    shares_of_bound: dict[str, float]
+    has_snapping: bool
     loss: str | None = None
 
     @property
-    def within(self) -> bool:
-        return all(share <= 1.0 for share in self.shares.values())
+    def is_within_bounds(self) -> bool:
+        return all(share <= 1.0 for share in self.shares_of_bound.values())
 
     @property
     def agrees(self) -> bool:
-        return self.within or self.loss is not None
+        return self.is_within_bounds or self.loss is not None
 
     def __str__(self) -> str:
         if self.loss is not None:
@@ -99,9 +99,9 @@ class TableCheck:
                 f"the table LOSES {self.metres * 1e3:.2g} mm and {self.radians:.2g} rad to rounding on"
                 f" {self.samples} samples: {self.loss}"
             )
-        bound = "rounding and snapping" if self.snapped else "rounding"
-        figures = self.shares if self.snapped else self.units
-        unit, form = ("of the bound", ".0%") if self.snapped else ("in eps*scale", ".2g")
+        bound = "rounding and snapping" if self.has_snapping else "rounding"
+        figures = self.shares_of_bound if self.has_snapping else self.units
+        unit, form = ("of the bound", ".0%") if self.has_snapping else ("in eps*scale", ".2g")
         worst = ", ".join(f"{name} {value:{form}}" for name, value in figures.items())
         verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"
         return (
@@ -114,35 +114,35 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
-    motion = relative_motion(oracle, tree, table, samples)
+    motion = compute_relative_motion(oracle, tree, table, samples)
     T = table.placement(own_q)
     differences = {
         "placement": (
             np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
             rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
         ),
-        "jacobian": _halves(jacobian(table, own_q) - motion.jacobian[..., columns]),
-        "acceleration": _halves(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
+        "jacobian": _split_rows(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        "acceleration": _split_rows(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
     }
-    size = sizes(tree, table, samples)
-    slack = _Slack(table, own_q, size)
-    units, shares = _measured(differences, size, slack)
+    size = compute_error_scales(tree, table, samples)
+    snap_effect = _SnapEffect(table, own_q, size)
+    units, shares = _compare_with_bounds(differences, size, snap_effect)
     loss = None
-    own = own_length(table)
+    own = table_length(table)
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
-        _, longer = _measured(differences, size.of_length(own), slack)
-        loss = _loss(table) if max(longer.values()) <= 1.0 else None
+        _, longer = _compare_with_bounds(differences, size.with_reach(own), snap_effect)
+        loss = _describe_loss(table) if max(longer.values()) <= 1.0 else None
     metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
     snapped = bool(table.snap and table.snap.changes)
     return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
 
 
-def own_length(table: DHTable) -> float:
+def table_length(table: DHTable) -> float:
     """Return the sum of all lengths in a table, with base and tool, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
-def _loss(table: DHTable) -> str:
+def _describe_loss(table: DHTable) -> str:
     """Return a text that names the longest length in the table, its rounding error and a remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
@@ -160,8 +160,8 @@ def _loss(table: DHTable) -> str:
 _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
-def _measured(
-    differences: _Differences, size: Sizes, slack: _Slack
+def _compare_with_bounds(
+    differences: _Differences, size: ErrorScales, snap_effect: _SnapEffect
 ) -> tuple[dict[str, float], dict[str, float]]:
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(size.reach)
@@ -170,25 +170,25 @@ def _measured(
     #: One pair for the linear and one for the angular differences. The first value is multiplied by the
     #: relative rounding error; the second value is the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
-        "placement": ((size.reach, slack.metres), (one, slack.turn)),
+        "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
-            (size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
-            (size.turning * one[:, None], slack.turn * columns),
+            (size.turning * reach + size.sliding, snap_effect.jacobian[:, None] * columns),
+            (size.turning * one[:, None], snap_effect.turn * columns),
         ),
         "acceleration": (
-            ((size.reach + slides) * rates, slack.acceleration * rates),
-            (rates, 4.0 * slack.turn * rates),
+            ((size.reach + slides) * rates, snap_effect.acceleration * rates),
+            (rates, 4.0 * snap_effect.turn * rates),
         ),
     }
     units, shares = dict[str, float](), dict[str, float]()
     for name, halves in differences.items():
         pairs = list(zip(halves, limits[name], strict=True))
-        units[name] = max(_worst(x, scale * EPS) for x, (scale, _) in pairs)
-        shares[name] = max(_worst(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
+        units[name] = max(_max_ratio(x, scale * EPS) for x, (scale, _) in pairs)
+        shares[name] = max(_max_ratio(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
     return units, shares
 
 
-def _worst(found: FloatArray, unit: FloatArray | float) -> float:
+def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
     return float((found / np.maximum(unit, MIN_DIVISOR)).max(initial=0.0))
 
 
@@ -201,7 +201,9 @@ class RelativeMotion:
     acceleration: FloatArray
 
 
-def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
+def compute_relative_motion(
+    oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples
+) -> RelativeMotion:
     x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
     T = oracle.placements(x)
     R = T[:, 0, :3, :3]
@@ -227,7 +229,7 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 
 @dataclass(frozen=True, slots=True)
-class Sizes:
+class ErrorScales:
     """Lengths and velocities to which the bounds on rounding errors are proportional.
 
     Attributes:
@@ -248,11 +250,11 @@ class Sizes:
     accelerations: FloatArray
     rounding: FloatArray
 
-    def of_length(self, metres: float) -> Sizes:
+    def with_reach(self, metres: float) -> ErrorScales:
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
-def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
+def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) -> ErrorScales:
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -276,16 +278,16 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 reach += value
             if mimicked_joint in names:
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
-    own = own_length(table)
-    reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
+    own = table_length(table)
+    reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
-    return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
+    return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
-class _Slack:
+class _SnapEffect:
     """Largest effect of snapping (rounding the table's angles) on the quantities of a table.
 
     Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
@@ -293,7 +295,7 @@ class _Slack:
     by at most twice this amount. The cross product of two axes changes by at most 2 * turn.
     """
 
-    def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
+    def __init__(self, table: DHTable, own_q: FloatArray, size: ErrorScales) -> None:
         self.turn, self.metres = 0.0, np.zeros(len(own_q))
         if table.snap is not None:
             values = table.coupling.values(own_q)
@@ -303,6 +305,6 @@ class _Slack:
         self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
 
 
-def _halves(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest absolute values of the linear and of the angular rows of (n, 6, ...)."""
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

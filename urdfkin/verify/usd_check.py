@@ -34,20 +34,20 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame, 
 from urdfkin.system.files import expand_home, read_bytes
 from urdfkin.system.processes import python_command, run_python
 from urdfkin.urdf.usd import UsdRemark, version
-from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
+from urdfkin.verify.mjcf_process import MAX_OUTPUT_BYTES, parse_answers, unpack_array
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
-PATIENCE = 60.0
+TIMEOUT = 60.0
 #: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in
 #: `_check_joint`).
-_ROTATION = 18.0
+_ROTATION_ROUNDINGS = 18.0
 #: Number of rounding errors in a joint's origin (derived in `_check_joint`).
-_ORIGIN = 3.0
+_ORIGIN_ROUNDINGS = 3.0
 #: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE_ROUNDOFF`.
 #: `_compare_prims` derives this bound.
-_TRANSFORM = 6.0 * np.pi
+_TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def read_usd(
     *,
     variants: Sequence[tuple[str, str]] = (),
     articulation: str | None = None,
-    patience: float = PATIENCE,
+    timeout: float = TIMEOUT,
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
@@ -81,13 +81,13 @@ def read_usd(
         "name": str(path),
         "variants": [list(pair) for pair in variants],
         "articulation": articulation,
-        "seconds": ceil(patience) + 1,
+        "seconds": ceil(timeout) + 1,
     }
     command = python_command(
         "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = run_python(command, json.dumps(request).encode(), patience, MOST)
-    answers, ending = parse_answers(output, status, library="OpenUSD", name=str(path), patience=patience)
+    output, status = run_python(command, json.dumps(request).encode(), timeout, MAX_OUTPUT_BYTES)
+    answers, ending = parse_answers(output, status, library="OpenUSD", name=str(path), timeout=timeout)
     if not answers:
         raise InputError(
             "OpenUSD cannot read this stage",
@@ -99,18 +99,18 @@ def read_usd(
     return UsdReading(answer["urdf"], tuple(UsdRemark(*one) for one in answer["remarks"]), str(path), answer)
 
 
-def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
+def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
     Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
     """
-    joints = read.answer["joints"]
+    joints = reading.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
         f"compared with OpenUSD {version()}: UsdPhysics and urdfkin read the same {len(joints)} joints"
         f" ({share:.1%} of the bound of single precision)"
     )
-    rest, remarks = _compare_prims(verifier.tree, read.answer)
+    rest, remarks = _compare_prims(verifier.tree, reading.answer)
     return f"{line}; {rest}", remarks
 
 
@@ -121,9 +121,10 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
-      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION` is this factor 18.
-    - Origin: three rounding errors (`_ORIGIN`): of the scale factor, of the scaled origin, and of the
-      transformed origin.
+      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION_ROUNDINGS` is this factor
+      18.
+    - Origin: three rounding errors (`_ORIGIN_ROUNDINGS`): of the scale factor, of the scaled origin, and of
+      the transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -133,9 +134,9 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     for p, quaternion in ((3, 4), (5, 6)):
         off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
         if off > 0.0:
-            shares.append(off / (_ORIGIN * SINGLE_ROUNDOFF * size) if size else np.inf)
+            shares.append(off / (_ORIGIN_ROUNDINGS * SINGLE_ROUNDOFF * size) if size else np.inf)
         R = rotation_from_quaternion(ours[quaternion]).T @ rotation_from_quaternion(theirs[quaternion])
-        shares.append(_angle(R) / (_ROTATION * SINGLE_ROUNDOFF))
+        shares.append(_angle(R) / (_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
         finite = abs(a) < np.inf
         if finite and a != b:
@@ -161,11 +162,11 @@ def _angle(R: FloatArray) -> float:
 
 
 #: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single_precision`).
-Single = Mapping[str, tuple[float, float, float, float, float]]
+SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SinglePrecision:
+class SinglePrecisionErrors:
     """Bounds on the effect of rounding to single precision on the links and the joints of a robot.
 
     Attributes:
@@ -181,7 +182,7 @@ class SinglePrecision:
     joints: FloatArray
 
 
-def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
+def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> SinglePrecisionErrors:
     """Return the largest errors of links and joints that result from rounding to single precision.
 
     The error of a stored number is at most half the distance to the next number in single precision; 0 has no
@@ -208,12 +209,12 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
       joint's constant offset plus the lengths of the two origins.
     - Joint without an entry in `single`: no rounding errors.
     """
-    of_links, joint_roundings = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
+    link_errors, joint_errors = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
-        way, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
+        position_error, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
         if joint.lock:
             lever = size + joint.length
-        joint_roundings[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
+        joint_errors[i] = position_error + angle * (0.0 if joint.kind.turns else lever), angle, share
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
@@ -221,10 +222,13 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
         if joint.mimic is not None:
             rule, mimicked_joint = joint.mimic, tree.joints[tree.joint_index(joint.mimic.mimicked_joint)]
             off = share * (abs(rule.multiplier) * largest_value(mimicked_joint.limit) + abs(rule.offset))
-            way, angle = (way + off, angle) if slides else (way, angle + off)
-        parent_way, parent_angle = of_links[joint.parent]
-        of_links[i + 1] = parent_way + way + (parent_angle + angle) * length, parent_angle + angle
-    return SinglePrecision(of_links, joint_roundings)
+            position_error, angle = (position_error + off, angle) if slides else (position_error, angle + off)
+        parent_position_error, parent_angle_error = link_errors[joint.parent]
+        link_errors[i + 1] = (
+            parent_position_error + position_error + (parent_angle_error + angle) * length,
+            parent_angle_error + angle,
+        )
+    return SinglePrecisionErrors(link_errors, joint_errors)
 
 
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
@@ -232,7 +236,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
 
     The bound assumes that a prim's transform consists of several operations: one operation for each joint on
     the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at
-    most `_TRANSFORM` u, the largest of these three values:
+    most `_TRANSFORM_ROUNDINGS` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
@@ -244,17 +248,17 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
       sqrt(2) t. The angle error is therefore at most sqrt(3/2) u.
     """
     prims: dict[str, str] = answer["prims"]
-    rows = unpacked(answer["rest"])
+    rows = unpack_array(answer["rest"])
     rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)[0]
+    ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)[0]
     # The root's pose in the stage is arbitrary, so all poses become relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
-    of_links = single_precision(tree, answer["single"]).links
-    far = float(np.linalg.norm(unpacked(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
+    link_errors = bound_single_precision_errors(tree, answer["single"]).links
+    far = float(np.linalg.norm(unpack_array(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
     remarks, worst = [], (0.0, 0.0)
     shares = []
     for k, (name, path) in enumerate(prims.items()):
@@ -262,8 +266,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         depth = len(tree.path(link)) + 1
         off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
         angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
-        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE_ROUNDOFF
-        length = of_links[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM) * 2.0 * far
+        turn = link_errors[link, 1] + depth * _TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF
+        length = link_errors[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM_ROUNDINGS) * 2.0 * far
         share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
         shares.append(share)
         worst = max(worst[0], off), max(worst[1], angle)

@@ -22,7 +22,7 @@ import numpy as np
 from urdfkin.urdf.confinement import limit_process
 from urdfkin.urdf.usd import Usd, UsdJoint, import_openusd, read_usd
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.mjcf_process import error_answer, packed, write_answer
+from urdfkin.verify.mjcf_process import make_error_answer, pack_array, write_answer
 
 
 def serve() -> None:
@@ -31,14 +31,14 @@ def serve() -> None:
     try:
         import_openusd()
         limit_process(request["seconds"])
-        write_answer(answer_of(request))
+        write_answer(read_stage(request))
     except Exception as error:
-        write_answer(error_answer(error, "OpenUSD cannot read this stage"))
+        write_answer(make_error_answer(error, "OpenUSD cannot read this stage"))
     # `os._exit` skips the exit handlers of the libraries.
     os._exit(0)
 
 
-def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
+def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
     read = read_usd(
         request["path"],
         request["name"],
@@ -50,13 +50,13 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
         "single": read.single_precision,
         "remarks": [astuple(one) for one in read.remarks],
         "prims": read.prims,
-        "rest": packed(read.rest_poses[:, :3]),
+        "rest": pack_array(read.rest_poses[:, :3]),
         "rest_q": read.rest_q.tolist(),
-        "joints": _second_reading(read),
+        "joints": _read_joints_twice(read),
     }
 
 
-def _second_reading(read: Usd) -> dict[str, Any]:
+def _read_joints_twice(read: Usd) -> dict[str, Any]:
     """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
@@ -69,18 +69,18 @@ def _second_reading(read: Usd) -> dict[str, Any]:
             # For a joint with PhysicsArticulationRootAPI, OpenUSD also describes an articulation.
             # The function skips the description of the articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
-                found[str(path)] = _described(physics, one, read)
+                found[str(path)] = _describe_joint(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
 
 
-def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
+def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
     """Return `UsdJoint.as_list` for a joint that OpenUSD's parser has read."""
     frames = []
     for i in (0, 1):
         p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
         frames.append((np.array(p, float) * read.meters_per_unit, xyzw / np.linalg.norm(xyzw)))
-    free = _freedoms(physics, one)
+    free = _degrees_of_freedom(physics, one)
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
@@ -92,7 +92,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
     return UsdJoint(free, str(one.body0), str(one.body1), *frames[0], *frames[1], limits, 0.0).as_list()
 
 
-def _freedoms(physics: Any, one: Any) -> str:
+def _degrees_of_freedom(physics: Any, one: Any) -> str:
     """Return the names of a joint's degrees of freedom, such as `transX` or `rotX`."""
     for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
         if isinstance(one, kind):

@@ -24,16 +24,16 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import urdfkin_version
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify.bounds import KERNELS, Bound, magnitudes
-from urdfkin.verify.call import Call, Part
+from urdfkin.verify.bounds import KERNELS, Bound, compute_magnitudes
+from urdfkin.verify.call import Call, CallPart
 from urdfkin.verify.certificate import Certificate, Ledger, VerificationError
 from urdfkin.verify.comparison import (
-    CHECKS,
+    CHECK_KERNELS,
     BatchComparison,
     compare,
-    comparison_of,
+    compare_units,
     disagreement,
-    worst_of_each,
+    worst_disagreements,
 )
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
@@ -54,9 +54,9 @@ Verify = bool | Literal["sample"]
 SAMPLE = 100
 
 #: Maximum number of values that are compared at once, so that the values fit into the processor's cache.
-_PART_SIZE = 262_144
+_MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
-_MOST = 4096
+_MAX_CONFIGURATIONS = 4096
 
 
 class NotVerifiedWarning(UserWarning):
@@ -71,10 +71,10 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks the results of one robot and records them.
 
-    `unverifiable` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the library
-    that checks the results of the robot's methods. Pinocchio checks tables, the accuracy study and
-    enclosures, whatever the value of `oracle`. If the source is not a URDF, `reading` is a text about the
-    conversion to URDF and its check; otherwise `reading` is empty.
+    `known_refusal` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the
+    library that checks the results of the robot's methods. Pinocchio checks tables, the accuracy study and
+    enclosures, whatever the value of `oracle`. If the source is not a URDF, `source_notes` is a text about
+    the conversion to URDF and its check; otherwise `source_notes` is empty.
     """
 
     def __init__(
@@ -89,9 +89,9 @@ class Verifier:
         oracle: OracleName = "pinocchio",
     ) -> None:
         self.text, self.tree, self.origin = text, tree, origin
-        self.policy, self.mimic, self.unverifiable = as_verify(policy), mimic, unverifiable
+        self.policy, self.mimic, self.known_refusal = as_verify(policy), mimic, unverifiable
         self.library = oracle_library(oracle)
-        self.ledger, self.reading = Ledger(), ""
+        self.ledger, self.source_notes = Ledger(), ""
         self._oracles: dict[tuple[str, bool], Oracle] = {}
         self._refusals: dict[str, str] = {}
 
@@ -99,11 +99,11 @@ class Verifier:
         # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
-    def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
+    def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
         """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer."""
-        key = by.name, base is not None
+        key = library.name, base is not None
         if key not in self._oracles:
-            self._oracles[key] = by.oracle(
+            self._oracles[key] = library.make_oracle(
                 self.text,
                 self.tree,
                 mimic=self.mimic,
@@ -113,22 +113,22 @@ class Verifier:
             )
         return self._oracles[key]
 
-    def model(self, *, mimic: bool) -> Any:
+    def make_pinocchio_model(self, *, mimic: bool) -> Any:
         """Return a new `pinocchio.Model`; raise OracleError if Pinocchio cannot check the robot."""
-        if self.unverifiable is not None:
-            raise OracleError(self.unverifiable, where=self.tree.name)
+        if self.known_refusal is not None:
+            raise OracleError(self.known_refusal, where=self.tree.name)
         return build_model(
             self.text,
             self.tree,
             self.origin.root_joint,
             mimic=mimic,
             lock=dict(self.origin.lock),
-            coupled=self.mimic,
+            lock_mimic_joints=self.mimic,
         )
 
-    def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
+    def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
         # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
-        known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
+        known = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
             tree,
@@ -138,38 +138,38 @@ class Verifier:
             unverifiable=known,
             oracle=self.library.name,
         )
-        verifier.reading = self.reading
+        verifier.source_notes = self.source_notes
         return verifier
 
-    def cannot(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> str | None:
+    def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
         """Return the reason why an oracle cannot check this robot; None if it can."""
-        if by is PINOCCHIO and self.unverifiable is not None:
-            return self.unverifiable
-        if by.name not in self._refusals:
+        if library is PINOCCHIO and self.known_refusal is not None:
+            return self.known_refusal
+        if library.name not in self._refusals:
             try:
-                self.oracle(base, by)
+                self.oracle(base, library)
             except OracleError as error:
-                self._refusals[by.name] = str(error)
-                if by is PINOCCHIO:
-                    self.unverifiable = str(error)
-        return self._refusals.get(by.name)
+                self._refusals[library.name] = str(error)
+                if library is PINOCCHIO:
+                    self.known_refusal = str(error)
+        return self._refusals.get(library.name)
 
-    def policy_of_call(self, verify: Verify | None) -> Verify:
+    def resolve_policy(self, verify: Verify | None) -> Verify:
         return as_verify(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
         """Raise InstallationError if a check of the call needs Pinocchio, and Pinocchio is missing."""
         if (
-            self.policy_of_call(verify) is not False
-            and self.unverifiable is None
+            self.resolve_policy(verify) is not False
+            and self.known_refusal is None
             and self.library is PINOCCHIO
         ):
             pinocchio()
 
     def certificate(self) -> Certificate:
         return replace(
-            self.ledger.certificate(self.tree.name, self.library.words),
-            reading="; ".join(filter(None, (self.reading, self.origin.locks_text))),
+            self.ledger.certificate(self.tree.name, self.library.name_and_version),
+            source_notes="; ".join(filter(None, (self.source_notes, self.origin.locks_text))),
             source=self.origin.source,
             sha256=self.sha256,
             urdfkin=urdfkin_version(),
@@ -187,28 +187,30 @@ class Verifier:
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
         """Check and record the results of a call; raise VerificationError if a difference is too large."""
-        ledger, policy = self.ledger, self.policy_of_call(verify)
+        ledger, policy = self.ledger, self.resolve_policy(verify)
         if policy is False:
-            ledger.unchecked(quantity.name, call.results)
+            ledger.count_unchecked(quantity.name, call.result_count)
             return
-        if (reason := self.cannot(call.base, self.library)) is not None:
+        if (reason := self.find_refusal(call.base, self.library)) is not None:
             _warn(reason)
-            ledger.unchecked(quantity.name, call.results, reason)
+            ledger.count_unchecked(quantity.name, call.result_count, reason)
             return
-        results = call.question.flat(result, quantity.axes)
+        results = call.query.flatten_result(result, quantity.axes)
         total, worst = BatchComparison(), None
-        for part in parts(policy, call.n, results[:1].size):
+        for part in split_into_parts(policy, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
-            if failure is not None and (worst is None or comparison.share > total.share):
+            if failure is not None and (worst is None or comparison.share_of_bound > total.share_of_bound):
                 worst = failure
             total += comparison
         if worst is not None:
             raise worst
-        ledger.checked(quantity.name, total)
-        if left := call.results - total.results:
-            ledger.unchecked(quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call')
+        ledger.count_checked(quantity.name, total)
+        if left := call.result_count - total.result_count:
+            ledger.count_unchecked(
+                quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call'
+            )
 
-    def with_check(
+    def make_checked_function(
         self,
         name: str,
         compute: Callable[..., FloatArray | None],
@@ -221,10 +223,10 @@ class Verifier:
         The last argument of `compute` is `out`. If `compute` does not support the arguments, or if the oracle
         cannot check the robot, the returned function returns None without a check.
         """
-        quantity, by, frames = QUANTITIES[name], self.library, (frame,)
-        if self.cannot(None, by) is not None:
+        quantity, library, frames = QUANTITIES[name], self.library, (frame,)
+        if self.find_refusal(None, library) is not None:
             return lambda *arguments: None
-        for kernel in CHECKS:
+        for kernel in CHECK_KERNELS:
             preload.get_kernel(kernel, preload.LOAD_AFTER, KERNELS)
 
         def compute_and_check(*arguments: Any) -> FloatArray | None:
@@ -233,13 +235,15 @@ class Verifier:
                 return None
             rows = tuple(x[np.newaxis] for x in arguments[:-1])
             query = QueryBatch(frames, rows, reference)
-            x = Part(plan, reference, rows[0], rows[1:], FIXED_BASE_STATE, query)
+            x = CallPart(plan, reference, rows[0], rows[1:], FIXED_BASE_STATE, query)
             ours = result[np.newaxis, np.newaxis]
-            theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
+            theirs, bound = compute_oracle_results_with_bound(
+                quantity, self.oracle(None, library), x, ours, library
+            )
             comparison = compare(ours, theirs, bound, 2)
             if comparison.agrees:
                 warn_of_degrees(self.tree, arguments[0])
-                self.ledger.checked(name, comparison)
+                self.ledger.count_checked(name, comparison)
             else:  # `check` raises the error.
                 call = Call(self.tree, lambda _: plan, frame, reference, None, arguments[:-1])
                 self.check(quantity, call, result, True)
@@ -251,57 +255,57 @@ class Verifier:
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
         """Return the comparison with the oracle's results, and an error if a difference is too large."""
-        x = call.part(part)
+        x = call.select(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
         if comparison.agrees:
             return comparison, None
-        theirs, bound = oracle_results_with_bound(*compared)
+        theirs, bound = compute_oracle_results_with_bound(*compared)
         i, f = comparison.index
         k = part.start + i if isinstance(part, slice) else int(part[i])
         bound = Bound(*(np.broadcast_to(x, ours.shape)[i, f] for x in (bound.scale, bound.k)))
         if not (np.isfinite(bound.scale).all() and np.isfinite(theirs[i, f]).all()):
             raise RangeError(
                 f"the {quantity.name} of {call.frames[f]} leaves the range of double precision",
-                where=f"sample {list(call.index(k))}" if call.shape else None,
+                where=f"sample {list(call.batch_index(k))}" if call.shape else None,
                 remedy="give smaller numbers",
             )
         return comparison, VerificationError(
             quantity.name,
             call.frames[f],
             str(call.options.get("representation", call.reference.name)),
-            index=call.index(k),
+            index=call.batch_index(k),
             ours=ours[i, f],
             theirs=theirs[i, f],
             bound=EPS * bound.k * bound.scale,
             units=float(disagreement(ours[i, f], theirs[i, f], bound.scale).max()),
-            reproduce=self._replay(quantity, call, k, call.frames[f]),
+            reproduce=self._make_replay_line(quantity, call, k, call.frames[f]),
             oracle=self.library.title,
         )
 
-    def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
+    def _make_replay_line(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
-        reference = call.reference.name.lower() if quantity.referred else None
+        reference = call.reference.name.lower() if quantity.has_reference else None
         if call.base is None and quantity.command:
             return replay_line(self.origin, quantity.command, frame, reference, values)
         options = call.options if reference is None else {"reference": reference, **call.options}
         words = [*map(repr, values.values()), repr(frame), *(f"{x}={y!r}" for x, y in options.items())]
-        if (query := call.question.rows(np.array([k])).base) is not None:
+        if (query := call.query.select(np.array([k])).base) is not None:
             fields = query.placement, query.velocity, query.acceleration
             words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
         return f"{self.origin.python_call}.{quantity.method}({', '.join(words)})"
 
     # -- tables --------------------------------------------------------------------------------------
 
-    def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
+    def check_table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
         Raises TableError if a difference exceeds the bound.
         """
         from urdfkin.verify.tables import TableError, check_table
 
-        if (reason := self.cannot()) is not None:
+        if (reason := self.find_refusal()) is not None:
             _warn(reason)
             return None
         drawn = draw_samples(self.tree, samples, np.random.default_rng(0), with_special=True)
@@ -318,14 +322,14 @@ class Verifier:
             _warn(str(check))
         return check
 
-    def tree_parameters(self, parameters: TreeParameters) -> str | None:
+    def check_tree_parameters(self, parameters: TreeParameters) -> str | None:
         """Compare Khalil-Kleinfinger parameters with Pinocchio's placements of the links; return a text.
 
         The result is None, with a warning, if Pinocchio cannot check the robot.
         """
         from urdfkin.verify.tables import TableError
 
-        if (reason := self.cannot()) is not None:
+        if (reason := self.find_refusal()) is not None:
             _warn(reason)
             return None
         tree = self.tree
@@ -353,42 +357,42 @@ class Verifier:
 
 
 def comparison_with_oracle(
-    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
+    quantity: Quantity, oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> BatchComparison:
     if quantity.blocks is None:
-        theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
-        _check_count(quantity, by, len(theirs), len(ours))
+        theirs, bound = compute_oracle_results_with_bound(quantity, oracle, x, ours, library)
+        _check_result_count(quantity, library, len(theirs), len(ours))
         return compare(ours, theirs, bound, 2)
-    bound, units, first = bound_of(quantity, x, by), np.empty(ours.shape[:2]), 0
-    with _not_finite_is_reported():
+    bound, units, first = compute_bound(quantity, x, library), np.empty(ours.shape[:2]), 0
+    with _ignore_overflow():
         for theirs in oracle_blocks(quantity, oracle, x.query):
             part = slice(first, first + len(theirs))
             if part.stop > len(ours):
-                _check_count(quantity, by, part.stop, len(ours))
+                _check_result_count(quantity, library, part.stop, len(ours))
             scale = bound.scale if len(bound.scale) == 1 else bound.scale[part]
-            units[part], first = worst_of_each(ours[part], theirs, scale, 2), part.stop
-    _check_count(quantity, by, first, len(ours))
-    return comparison_of(units, bound)
+            units[part], first = worst_disagreements(ours[part], theirs, scale, 2), part.stop
+    _check_result_count(quantity, library, first, len(ours))
+    return compare_units(units, bound)
 
 
-def _check_count(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
+def _check_result_count(quantity: Quantity, library: OracleLibrary, found: int, wanted: int) -> None:
     if found != wanted:
         raise OracleError(
-            f"{by.title} does not return the {quantity.name} of each configuration",
+            f"{library.title} does not return the {quantity.name} of each configuration",
             found=f"{found} of {wanted} results",
             remedy="please report this as an error of urdfkin, with the URDF",
         )
 
 
-def oracle_results_with_bound(
-    quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary = PINOCCHIO
+def compute_oracle_results_with_bound(
+    quantity: Quantity, oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
-    if quantity.against is not None:
-        return quantity.against(oracle, x, ours, by)
-    return oracle_results(quantity, oracle, x.query), bound_of(quantity, x, by)
+    if quantity.results_and_bound is not None:
+        return quantity.results_and_bound(oracle, x, ours, library)
+    return oracle_results(quantity, oracle, x.query), compute_bound(quantity, x, library)
 
 
-def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
+def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound on the difference between urdfkin's results and the oracle's.
 
     The length of a path without prismatic joints is the same in every configuration. For a placement or a
@@ -396,27 +400,29 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
-    key = "bound", quantity.name, x.reference, by.name
+    key = "bound", quantity.name, x.reference, library.name
     bound: Bound | None = x.plan.cache.get(key) if constant else None
     if bound is None:
         q = x.q[:1] if constant else x.q
-        bound = quantity.bound(x.plan, by.size(magnitudes(x.plan, q, v, a, x.state)), x.reference)
+        bound = quantity.bound(
+            x.plan, library.adapt_magnitudes(compute_magnitudes(x.plan, q, v, a, x.state)), x.reference
+        )
         if constant:
             x.plan.cache[key] = bound
     return bound
 
 
-def own_results(quantity: Quantity, x: Part) -> FloatArray:
-    return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
+def compute_own_results(quantity: Quantity, x: CallPart) -> FloatArray:
+    return quantity.compute_results(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
 #: Suppresses NumPy's warnings about inf and NaN, because the comparison reports these values.
-_not_finite_is_reported = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
+_ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 
-@_not_finite_is_reported()
+@_ignore_overflow()
 def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
-    return quantity.ask(oracle, query)
+    return quantity.ask_oracle(oracle, query)
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
@@ -437,12 +443,12 @@ def as_verify(verify: object) -> Verify:
     raise InputError('verify must be True, False or "sample"', found=safe_repr(verify))
 
 
-def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
+def split_into_parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
     The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
     """
-    step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
+    step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:
         drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
         yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))

@@ -27,7 +27,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, Quantity
 
 FLOATING = tuple(name for name in BUILT_IN if name != "idyntree")
@@ -320,7 +320,7 @@ FEW = ["ur5", "panda", "a1", "tiago", "kinova", "talos_reduced", "so101", "doubl
 def _room(robot: Robot, q: FloatArray, links: list[str], quantity: Quantity) -> FloatArray:
     """Return the bound of the rounding errors of a quantity at q (nq,): (links, ...)."""
     plan = robot.plan([robot.tree.link_index(link) for link in links])
-    bound = quantity.bound(plan, magnitudes(plan, q[None], None, None, FIXED_BASE_STATE), ALIGNED)
+    bound = quantity.bound(plan, compute_magnitudes(plan, q[None], None, None, FIXED_BASE_STATE), ALIGNED)
     return np.asarray((EPS * bound.k * bound.scale)[0])
 
 

@@ -28,7 +28,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.system.plain_xml import parse_xml
-from urdfkin.verify.bounds import magnitudes
+from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, VELOCITY
 
 ROBOTS = (
@@ -56,7 +56,7 @@ def _differences(
         T, twist, J = library.evaluate(their_q, their_v, link)
         frame = f"link:{link}"
         plan = robot.plan([robot.tree.link_index(link)])
-        size = magnitudes(plan, q[None], v[None], None, FIXED_BASE_STATE)
+        size = compute_magnitudes(plan, q[None], v[None], None, FIXED_BASE_STATE)
         reach = _farthest_mass(robot, q) if library.at_mass else 0.0
         roundings = size.roundings * library.roundings / PINOCCHIO_ROUNDINGS
         size = replace(size, p=size.p + reach, vel=size.vel + size.w * reach, roundings=roundings)

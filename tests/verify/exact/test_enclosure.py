@@ -60,7 +60,7 @@ def quantities(x: Enclosures) -> tuple[Enclosure, ...]:
 
 def holds(enclosure: Enclosure, motion: ExactMotion, link: int, reference: Reference) -> bool:
     """Return whether the true values of the motion lie in the intervals."""
-    true = QUANTITIES[enclosure.quantity].truth(motion, link, reference)
+    true = QUANTITIES[enclosure.quantity].enclose(motion, link, reference)
     rows = zip(enclosure.lower.flat, true.flat, enclosure.upper.flat, strict=True)
     return all(mp.mpf(low) <= mp.mpf(number) <= mp.mpf(high) for low, number, high in rows)
 
@@ -187,12 +187,12 @@ def test_the_stated_error_of_a_result_is_rounded_upward() -> None:
     generator = np.random.default_rng(3)
     x, lower = generator.normal(size=(2, 200)) * 10.0 ** generator.integers(-9, 9, (2, 200))
     upper = np.nextafter(lower, np.inf)
-    errors = Enclosure("velocity", lower, upper, x, None).error(x)
+    errors = Enclosure("velocity", lower, upper, x, None).error_bound(x)
     for error, *numbers in zip(errors, x, lower, upper, strict=True):
         number, low, high = map(Fraction, numbers)
         largest = max(abs(number - low), abs(number - high))
         assert largest <= Fraction(error) <= largest * (1 + Fraction(2) ** -51)
-    assert Enclosure("velocity", x, x, x, None).error(x).tolist() == [0.0] * 200
+    assert Enclosure("velocity", x, x, x, None).error_bound(x).tolist() == [0.0] * 200
 
 
 @pytest.mark.slow
@@ -206,7 +206,7 @@ def test_a_hessian_is_enclosed_on_request(name: str) -> None:
         one = present(robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian)
         assert holds(one, motion, link, reference)
         assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
-        assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
+        assert one.error_bound(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
 
 
 #: A joint, a joint that mimics it, and a joint that mimics the second one.
@@ -222,9 +222,9 @@ FOLLOWERS = urdfs.robot(
 def test_a_hessian_with_two_mimic_joints_is_enclosed_with_both_multipliers(reference: Reference) -> None:
     robot, x = urdfkin.load(FOLLOWERS), (np.array([0.3]), np.array([1.0]), np.array([0.5]))
     one = present(robot.enclose(*x, "d", reference, hessian=True).hessian)
-    assert one.error(robot.hessian(x[0], "d", reference)).max() < 1e-14
+    assert one.error_bound(robot.hessian(x[0], "d", reference)).max() < 1e-14
     # With one joint velocity v = 1, J-dot = H v.
-    rate = QUANTITIES["jacobian rate"].truth(true_motion(robot, x), robot.tree.frame_link("d"), reference)
+    rate = QUANTITIES["jacobian rate"].enclose(true_motion(robot, x), robot.tree.frame_link("d"), reference)
     assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
 
 
@@ -249,7 +249,7 @@ def test_threads_with_different_digits_change_neither_results_nor_the_users_prec
 
 def test_a_robot_that_pinocchio_refuses_can_be_enclosed() -> None:
     robot = robot_of("panda")
-    robot.verifier.unverifiable = "it was told to"
+    robot.verifier.known_refusal = "it was told to"
     enclosed = robot.enclose(*sample(robot), robot.tip_frame)
     assert enclosed.jacobian.pinocchio is None
     assert "Pinocchio" not in str(enclosed)

@@ -16,7 +16,13 @@ from tests.high_precision import orthogonal_factor
 from tests.strategies import rotations
 from urdfkin.model.recursion import Matrix
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.exact.numbers import decimal, ends, exact, nearest_rotation, precision
+from urdfkin.verify.exact.numbers import (
+    as_interval,
+    format_decimal,
+    interval_ends,
+    nearest_rotation,
+    precision,
+)
 
 DIGITS = (15, 50)
 #: Eight units in the last place of 53 and of 169 bits.
@@ -50,14 +56,14 @@ def test_a_decimal_with_any_exponent_lies_in_the_interval(word: str, digits: int
 
 @given(finite)
 def test_the_interval_of_a_double_has_zero_width(x: float) -> None:
-    assert true_ends(exact(x)) == (Fraction(x), Fraction(x))
+    assert true_ends(as_interval(x)) == (Fraction(x), Fraction(x))
 
 
 @pytest.mark.parametrize("digits", DIGITS)
 @given(x=st.floats(1e-300, 1e300))
 def test_the_interval_of_a_square_root_contains_the_root(digits: int, x: float) -> None:
     with precision(digits):
-        low, high = true_ends(exact(x).sqrt())
+        low, high = true_ends(as_interval(x).sqrt())
     assert low**2 <= Fraction(x) <= high**2
     assert high - low <= high * WIDTH[digits]
 
@@ -69,7 +75,7 @@ def test_cosine_and_sine_of_every_double_lie_in_the_computed_intervals(digits: i
     context = independent.clone()
     context.prec = 1100 + 8 * digits  # what reducing 1e308 rad takes
     with precision(digits):
-        found = exact(angle).sin_cos()
+        found = as_interval(angle).sin_cos()
     for interval, function in zip(found, (context.sin, context.cos), strict=True):
         low, high = true_ends(interval)
         assert low <= fraction(function(context.mpf(angle))) <= high
@@ -85,7 +91,7 @@ def test_intervals_of_sine_and_cosine_include_the_omitted_terms_of_the_series(
     # width.
     x = Fraction(2) ** exponent
     with precision(digits):
-        sine, cosine = map(true_ends, exact(2.0**exponent).sin_cos())
+        sine, cosine = map(true_ends, as_interval(2.0**exponent).sin_cos())
     # Sine and cosine lie between two partial sums of their alternating series.
     assert sine[0] < x - x**3 / 6 + x**5 / 120
     assert sine[1] > x - x**3 / 6
@@ -95,7 +101,7 @@ def test_intervals_of_sine_and_cosine_include_the_omitted_terms_of_the_series(
 
 def nearest(M: FloatArray, digits: int) -> Matrix:
     with precision(digits):
-        x, y, z = (tuple(map(exact, row)) for row in M.tolist())
+        x, y, z = (tuple(map(as_interval, row)) for row in M.tolist())
         return nearest_rotation((x, y, z))
 
 
@@ -134,7 +140,7 @@ def test_the_nearest_rotation_of_an_exact_rotation_is_equal_with_zero_width() ->
 @given(st.integers(-(2**200), 2**200), st.integers(-1400, 1100))
 def test_the_doubles_around_an_interval_are_the_nearest_outside_the_interval(man: int, exponent: int) -> None:
     with precision(120):
-        low, high = ends(arb((man, exponent)))
+        low, high = interval_ends(arb((man, exponent)))
     true = Fraction(man) * Fraction(2) ** exponent
     assert low == -math.inf or Fraction(low) <= true
     assert high == math.inf or true <= Fraction(high)
@@ -142,7 +148,7 @@ def test_the_doubles_around_an_interval_are_the_nearest_outside_the_interval(man
 
 
 def test_both_ends_of_a_whole_number_are_the_number() -> None:
-    assert ends(1) == (1.0, 1.0)
+    assert interval_ends(1) == (1.0, 1.0)
 
 
 moderate = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
@@ -152,7 +158,7 @@ moderate = st.floats(-1e6, 1e6).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
 def test_a_decimal_is_the_true_value_rounded_to_seventeen_digits(x: float, y: float, z: float) -> None:
     true = Fraction(x) / Fraction(y) + Fraction(z)
     with precision(50):
-        found = decimal(exact(x) / y + z, 1e-15)
+        found = format_decimal(as_interval(x) / y + z, 1e-15)
     with localcontext(prec=17):
         expected = Decimal(true.numerator) / Decimal(true.denominator)
     if found is None:  # x / y and z cancel, but for less than thirty digits
@@ -166,6 +172,6 @@ def test_a_decimal_is_the_true_value_rounded_to_seventeen_digits(x: float, y: fl
 
 def test_a_ball_with_a_too_large_radius_has_no_decimal() -> None:
     with precision(50):
-        assert decimal(arb(1.0, 1e-19), 1.0) is None
-        assert decimal(arb(0.0, 1e-19), 1e-12) is None
-        assert decimal(arb(0.0, 1e-19), 1e-3) == "0"
+        assert format_decimal(arb(1.0, 1e-19), 1.0) is None
+        assert format_decimal(arb(0.0, 1e-19), 1e-12) is None
+        assert format_decimal(arb(0.0, 1e-19), 1e-3) == "0"

@@ -24,8 +24,8 @@ from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, freeze
 from urdfkin.verify.call import Call
-from urdfkin.verify.exact.numbers import ends, enough_digits, precision, read_exact
-from urdfkin.verify.exact.recursion import move, on_base
+from urdfkin.verify.exact.numbers import enough_digits, interval_ends, precision, read_exact_joints
+from urdfkin.verify.exact.recursion import compute_motion, make_base_state
 from urdfkin.verify.quantities import (
     ACCELERATION,
     HESSIAN,
@@ -35,12 +35,12 @@ from urdfkin.verify.quantities import (
     VELOCITY,
     Quantity,
 )
-from urdfkin.verify.verifier import Verifier, oracle_results, own_results
+from urdfkin.verify.verifier import Verifier, compute_own_results, oracle_results
 
 #: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
-LEAST_DIGITS, MOST_DIGITS = 15, 10_000
+MIN_DIGITS, MAX_DIGITS = 15, 10_000
 
-_ENDS = np.vectorize(ends, otypes=[float, float])
+_ENDS = np.vectorize(interval_ends, otypes=[float, float])
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -68,16 +68,16 @@ class Enclosure:
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
         """Return whether each number of `x` is inside its interval; raise InputError for a wrong shape."""
-        x = self._alike(x)
+        x = self._check_shape(x)
         return (self.lower <= x) & (x <= self.upper)
 
-    def error(self, x: ArrayLike) -> FloatArray:
+    def error_bound(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
-        x = self._alike(x)
+        x = self._check_shape(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
 
-    def _alike(self, x: ArrayLike) -> FloatArray:
+    def _check_shape(self, x: ArrayLike) -> FloatArray:
         x = as_floats(x, f"the {self.quantity}")
         if x.shape != self.lower.shape:
             raise InputError(f"the {self.quantity} has the shape {self.lower.shape}", found=f"{x.shape}")
@@ -135,7 +135,7 @@ def enclose(
 ) -> Enclosures:
     """Return intervals that contain the true results of one frame for one sample."""
     if digits is not None:
-        digits = as_int(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
+        digits = as_int(digits, "digits", MIN_DIGITS, MAX_DIGITS)
     tree = verifier.tree
     call = Call(tree, plan_of, as_str(frame, "frame"), reference, base, inputs)
     if call.shape:
@@ -146,23 +146,23 @@ def enclose(
         )
     for x, name in zip(inputs, "qva", strict=True):
         parse_finite(tree, x, name)
-    link, part = call.links[0], call.part(slice(0, 1))
+    link, part = call.links[0], call.select(slice(0, 1))
     path = tree.path(link)
     digits = digits or enough_digits(len(path))
     with precision(digits):
-        motion = move(
+        motion = compute_motion(
             tree,
-            read_exact(verifier.text, tree, path),
+            read_exact_joints(verifier.text, tree, path),
             *(batch[0] for batch in part.query.inputs),
-            base=None if base is None else on_base(base),
+            base=None if base is None else make_base_state(base),
         )
         rows = (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN, JACOBIAN_RATE, *([HESSIAN] if hessian else []))
-        bounds = [(row, *_ENDS(row.truth(motion, link, call.reference))) for row in rows]
-    oracle = None if verifier.cannot(base) else verifier.oracle(base)
+        bounds = [(row, *_ENDS(row.enclose(motion, link, call.reference))) for row in rows]
+    oracle = None if verifier.find_refusal(base) else verifier.oracle(base)
 
-    def enclosed(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
-        ours = freeze(own_results(row, part)[0, 0])
+    def make_enclosure(row: Quantity, lower: FloatArray, upper: FloatArray) -> Enclosure:
+        ours = freeze(compute_own_results(row, part)[0, 0])
         theirs = None if oracle is None else freeze(oracle_results(row, oracle, part.query)[0, 0])
         return Enclosure(row.name, freeze(lower), freeze(upper), ours, theirs)
 
-    return Enclosures(frame, call.reference, digits, *(enclosed(*found) for found in bounds))
+    return Enclosures(frame, call.reference, digits, *(make_enclosure(*found) for found in bounds))

@@ -4,8 +4,8 @@ An interval consists of a midpoint with many digits, and a radius. The library A
 that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
 triples of intervals.
 
-`read_exact` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already checked
-the text.
+`read_exact_joints` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already
+checked the text.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from urdfkin.verify.bounds import DecimalErrors
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 DIGITS = 50
 #: Number of digits before the additional digit for each joint: twice the 15 decimal digits of a double.
-_TWO_DOUBLES = 30
+_BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
-_BITS = math.log2(10.0)
+_BITS_PER_DIGIT = math.log2(10.0)
 #: Number of additional bits of an interval; for example, 15 digits have 50 + 5 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
-_MORE_BITS = 5
+_ADDITIONAL_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
-_SIGNIFICANT = 17
+_SIGNIFICANT_DIGITS = 17
 #: Number of digits for the conversion of a midpoint to a decimal, before the decimal is rounded to 17 digits.
-_ALL_DIGITS = 200
+_CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
-_SPARE = 30
+_NEWTON_BITS = 30
 
-_ONE_THREAD = make_fork_safe_lock()
+_precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joints: int) -> int:
@@ -56,7 +56,7 @@ def enough_digits(joints: int) -> int:
     Each joint on the path to the frame adds one digit. One digit is enough for the growth of the intervals: a
     joint with an oblique axis makes the intervals only about twice as wide.
     """
-    return _TWO_DOUBLES + joints
+    return _BASE_DIGITS + joints
 
 
 @contextmanager
@@ -66,31 +66,31 @@ def precision(digits: int) -> Iterator[None]:
     Arb has one precision for the whole process. A lock therefore allows only one thread at a time to run such
     a block.
     """
-    with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
+    with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
 
 
-def exact(value: Number) -> Number:
+def as_interval(value: Number) -> Number:
     """Return a number or a decimal as an interval; a double or an integer becomes an interval of width 0."""
     return arb(value)
 
 
-def ends(x: Number) -> tuple[float, float]:
+def interval_ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
     # This branch saves time, because most numbers of a large robot are the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
-    return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
+    return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
 
 
-def _outward(end: arb, towards: float) -> float:
+def _round_outward(end: arb, towards: float) -> float:
     """Round an exact number to a double in the direction `towards`."""
     found = float(end)
     inside = arb(found) > end if towards < 0.0 else arb(found) < end
     return math.nextafter(found, towards) if inside else found
 
 
-def decimal(x: Number, negligible: float) -> str | None:
+def format_decimal(x: Number, negligible: float) -> str | None:
     """Return an interval's midpoint as a decimal of 17 significant digits; None if the interval is too wide.
 
     The radius must be at most 1e-20 times the midpoint. The decimal then differs from the true value by at
@@ -98,8 +98,8 @@ def decimal(x: Number, negligible: float) -> str | None:
     times `negligible`.
 
     >>> with precision(50):
-    ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)
-    ('0.33333333333333333', '2', '0')
+    ...     decimal(exact(1) / 3, 1e-15), decimal(as_interval(2), 1e-15), format_decimal(arb(0.0, 1e-40),
+    1e-15) ('0.33333333333333333', '2', '0')
     """
     if isinstance(x, int):
         return str(x)
@@ -109,11 +109,11 @@ def decimal(x: Number, negligible: float) -> str | None:
     if not radius <= abs(middle) * 1e-20:
         return None
     digits, power = middle.man_exp()
-    with localcontext(prec=_ALL_DIGITS):
+    with localcontext(prec=_CONVERSION_DIGITS):
         number = int(digits) * Decimal(2) ** int(power)
-    with localcontext(prec=_SIGNIFICANT, rounding=ROUND_HALF_EVEN):
+    with localcontext(prec=_SIGNIFICANT_DIGITS, rounding=ROUND_HALF_EVEN):
         rounded = (+number).normalize()
-    return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT else str(rounded)
+    return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT_DIGITS else str(rounded)
 
 
 class NumberType(NamedTuple):
@@ -127,15 +127,17 @@ class NumberType(NamedTuple):
     root: Callable[[Number], Number]
 
 
-BALLS = NumberType(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
+INTERVALS = NumberType(
+    as_interval, lambda angle: as_interval(angle).sin_cos(), lambda x: as_interval(x).sqrt()
+)
 
 
-def unit(x: Vector, kind: NumberType = BALLS) -> Vector:
+def normalise(x: Vector, kind: NumberType = INTERVALS) -> Vector:
     length = kind.root(eq.dot(x, x))
     return x[0] / length, x[1] / length, x[2] / length
 
 
-def about(axis: Vector, angle: Number, kind: NumberType = BALLS) -> Matrix:
+def rotation_about(axis: Vector, angle: Number, kind: NumberType = INTERVALS) -> Matrix:
     """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
     s, c = kind.sine_cosine(angle)
     columns = (
@@ -148,13 +150,13 @@ def about(axis: Vector, angle: Number, kind: NumberType = BALLS) -> Matrix:
     return found
 
 
-def from_rpy(rpy: Vector, kind: NumberType = BALLS) -> Matrix:
+def rotation_from_rpy(rpy: Vector, kind: NumberType = INTERVALS) -> Matrix:
     x, y, z = ((*kind.sine_cosine(angle), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
 
-def from_quaternion(quaternion: Sequence[Number], kind: NumberType = BALLS) -> Matrix:
+def rotation_from_quaternion(quaternion: Sequence[Number], kind: NumberType = INTERVALS) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length."""
     length = kind.root(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
@@ -169,17 +171,17 @@ def nearest_rotation(M: Matrix) -> Matrix:
     -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of each
     interval.
     """
-    with ctx.workprec(ctx.prec + _SPARE):
+    with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
-            steps = eq.product(M, _defect(M))
+            steps = eq.product(M, _orthogonality_defect(M))
             x, y, z = (eq.minus(row, eq.times(0.5, step)) for row, step in zip(M, steps, strict=True))
             M = x, y, z
-        bound = arb(0, sum(abs(number) for row in _defect(M) for number in row).upper())
+        bound = arb(0, sum(abs(number) for row in _orthogonality_defect(M) for number in row).upper())
         x, y, z = ((a + bound, b + bound, c + bound) for a, b, c in M)
     return x, y, z
 
 
-def _defect(M: Matrix) -> Matrix:
+def _orthogonality_defect(M: Matrix) -> Matrix:
     """Return M^T M - I, which is 0 for a rotation."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
@@ -187,7 +189,7 @@ def _defect(M: Matrix) -> Matrix:
 
 
 #: First URDF version with the attribute `quat_xyzw`; older versions ignore the attribute.
-_WITH_QUATERNIONS = (1, 1)
+_FIRST_QUATERNION_VERSION = (1, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,90 +207,93 @@ class ExactJoint:
     offset: Number
 
 
-def read_exact(
-    text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
+def read_exact_joints(
+    text: str, tree: KinematicTree, joint_indices: Iterable[int] | None = None, kind: NumberType = INTERVALS
 ) -> dict[int, ExactJoint]:
     """Return a dictionary from a joint's index to the joint's numbers in the URDF text, not rounded.
 
-    `among` contains the indices of the joints; None means all joints.
+    `joint_indices` contains the indices of the joints; None means all joints.
     """
     exact_text = _ExactText(text, kind)
-    indices = range(len(tree.joints)) if among is None else among
-    return {i: exact_text.joint_of(tree.joints[i], tree.name) for i in indices}
+    indices = range(len(tree.joints)) if joint_indices is None else joint_indices
+    return {i: exact_text.find_joint(tree.joints[i], tree.name) for i in indices}
 
 
-def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
+def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
     """Return the errors of the conversion of decimals to doubles, for the joints on a path and q (n, nq)."""
-    return _ExactText(text).conversion(tree, path, q)
+    return _ExactText(text).conversion_errors(tree, path, q)
 
 
 # Parsing a large URDF is slower than computing the intervals of one sample.
 @lru_cache(maxsize=1)
 class _ExactText:
-    def __init__(self, text: str, kind: NumberType = BALLS) -> None:
+    def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:
         self.kind = kind
         root = parse_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
-        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _WITH_QUATERNIONS
+        self.quaternions = tuple(map(int, root.get("version", "1.0").split("."))) >= _FIRST_QUATERNION_VERSION
 
-    def joint_of(self, joint: Joint, robot: str) -> ExactJoint:
+    def find_joint(self, joint: Joint, robot: str) -> ExactJoint:
         if joint.lock is not None:
-            return self.locked(self.joint_of(joint.lock.joint, robot), joint.lock)
+            return self.apply_lock(self.find_joint(joint.lock.joint, robot), joint.lock)
         element = self.elements.get(joint.name)
         if element is not None:
-            return self.joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
+            return self.parse_joint(element, has_axis=joint.kind.has_axis, is_mimic=joint.mimic is not None)
         if joint.kind in (JointKind.FLOATING, JointKind.PLANAR):
             return ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
-    def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
+    def apply_lock(self, free: ExactJoint, lock: Lock) -> ExactJoint:
         R, p = free.R, free.p
         value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:
-            R = eq.product(R, about(free.axis, value, self.kind))
+            R = eq.product(R, rotation_about(free.axis, value, self.kind))
         else:
             p = eq.plus(p, eq.rotate(R, eq.times(value, free.axis)))
         return ExactJoint(R, p, free.axis, 1, 0)
 
-    def joint(self, element: Element, *, has_axis: bool, is_mimic: bool) -> ExactJoint:
-        axis = self.vector(element.find("axis"), "xyz", "1 0 0")
-        multiplier, offset = self.rule(str(element.get("name"))) if is_mimic else (1, 0)
+    def parse_joint(self, element: Element, *, has_axis: bool, is_mimic: bool) -> ExactJoint:
+        axis = self.parse_vector(element.find("axis"), "xyz", "1 0 0")
+        multiplier, offset = self.resolve_rule(str(element.get("name"))) if is_mimic else (1, 0)
         return ExactJoint(
-            R=self.rotation(element.find("origin")),
-            p=self.vector(element.find("origin"), "xyz", "0 0 0"),
-            axis=unit(axis, self.kind) if has_axis else axis,
+            R=self.parse_rotation(element.find("origin")),
+            p=self.parse_vector(element.find("origin"), "xyz", "0 0 0"),
+            axis=normalise(axis, self.kind) if has_axis else axis,
             multiplier=multiplier,
             offset=offset,
         )
 
-    def numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
+    def parse_numbers(self, element: Element | None, name: str, default: str) -> tuple[Number, ...]:
         written = default if element is None else element.get(name, default)
         return tuple(map(self.kind.number, written.split()))
 
-    def vector(self, element: Element | None, name: str, default: str) -> Vector:
-        x, y, z = self.numbers(element, name, default)
+    def parse_vector(self, element: Element | None, name: str, default: str) -> Vector:
+        x, y, z = self.parse_numbers(element, name, default)
         return x, y, z
 
     def has_quaternion(self, origin: Element | None) -> bool:
         """Return whether `quat_xyzw` gives an origin's rotation; URDF before 1.1 ignores this attribute."""
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
-    def rotation(self, origin: Element | None) -> Matrix:
+    def parse_rotation(self, origin: Element | None) -> Matrix:
         if origin is not None and self.has_quaternion(origin):
-            return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.kind)
-        return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
+            return rotation_from_quaternion(self.parse_numbers(origin, "quat_xyzw", ""), self.kind)
+        return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
-    def rule(self, name: str) -> tuple[Number, Number]:
+    def resolve_rule(self, name: str) -> tuple[Number, Number]:
         """Return M and C of a mimic joint's value M q + C, where q is the value of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
-            (factor,), (constant,) = self.numbers(rule, "multiplier", "1"), self.numbers(rule, "offset", "0")
+            (factor,), (constant,) = (
+                self.parse_numbers(rule, "multiplier", "1"),
+                self.parse_numbers(rule, "offset", "0"),
+            )
             multiplier, offset = multiplier * factor, offset + multiplier * constant
             name = str(rule.get("joint"))
         return multiplier, offset
 
-    def conversion(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
+    def conversion_errors(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
         at: dict[str, Any] = {
             joint.name: q[:, i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1
         }
@@ -299,22 +304,26 @@ class _ExactText:
             if (element := self.elements.get(joint.name)) is not None:
                 origin = element.find("origin")
                 if not self.has_quaternion(origin):
-                    angles += math.fsum(abs(float(x)) for x in self.numbers(origin, "rpy", "0")) / 2.0
+                    angles += math.fsum(abs(float(x)) for x in self.parse_numbers(origin, "rpy", "0")) / 2.0
                 if unlocked.mimic is not None:
-                    value = self.value(joint.name, at)
-                    rules += value.rules
+                    value = self.bound_value(joint.name, at)
+                    rules += value.rule_count
                     if unlocked.kind.turns:
-                        angles += value.error + 0.5 * (value.rules - 1) * (value.moved + value.offset)
+                        angles += value.error + 0.5 * (value.rule_count - 1) * (
+                            value.scaled_coordinate + value.offset
+                        )
                     elif joint.lock is None:
                         lengths[step] += max(0.0, value.offset - abs(unlocked.mimic.offset))
                     else:
-                        lengths[step] += max(0.0, value.moved + value.offset - abs(joint.lock.value))
+                        lengths[step] += max(
+                            0.0, value.scaled_coordinate + value.offset - abs(joint.lock.value)
+                        )
             if joint.kind.nv:
                 lengths.append(0.0)
                 step += 1
         return DecimalErrors(angles, rules, np.array(lengths))
 
-    def value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
+    def bound_value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
         """Return bounds on a joint's value and on the rounding error of this value.
 
         `at` maps the names of the independent joints to the values of these joints.
@@ -323,23 +332,23 @@ class _ExactText:
         if rule is None or name in at:
             return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
         m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
-        x = self.value(str(rule.get("joint")), at)
-        error = m * x.error + 1.5 * m * (x.moved + x.offset) + c
-        return _ValueBound(m * x.moved, m * x.offset + c, error, x.rules + 1)
+        x = self.bound_value(str(rule.get("joint")), at)
+        error = m * x.error + 1.5 * m * (x.scaled_coordinate + x.offset) + c
+        return _ValueBound(m * x.scaled_coordinate, m * x.offset + c, error, x.rule_count + 1)
 
 
 class _ValueBound(NamedTuple):
     """Upper bounds on a joint's value M q + C and on the rounding error of this value.
 
     Attributes:
-        moved: |M q|.
+        scaled_coordinate: |M q|.
         offset: Sum of the absolute values of the terms of C; C has one term for each mimic rule.
         error: Bound on the rounding error of the value, in eps, for a program that applies the mimic rules
             one after the other.
-        rules: Number of mimic rules.
+        rule_count: Number of mimic rules.
     """
 
-    moved: Any
+    scaled_coordinate: Any
     offset: float
     error: Any
-    rules: int
+    rule_count: int

@@ -20,10 +20,10 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.verify.exact.numbers import (
     ExactJoint,
-    about,
-    exact,
-    from_quaternion,
+    as_interval,
     nearest_rotation,
+    rotation_about,
+    rotation_from_quaternion,
 )
 from urdfkin.verify.oracle import BaseNumbers
 
@@ -37,14 +37,14 @@ _FREE_AXES = {
 }
 
 
-def on_base(base: BaseNumbers) -> LinkState:
+def make_base_state(base: BaseNumbers) -> LinkState:
     """Return the base's motion as the position, velocity and acceleration of the root link.
 
     The base's rotation matrix is replaced by the nearest rotation.
     """
 
     def vector(x: FloatArray) -> Vector:
-        return exact(x[0]), exact(x[1]), exact(x[2])
+        return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
 
     T, six, six_2 = base.placement, base.velocity, base.acceleration
     R = nearest_rotation((vector(T[0]), vector(T[1]), vector(T[2])))
@@ -60,7 +60,7 @@ class ExactMotion:
     nv: int
 
 
-def move(
+def compute_motion(
     tree: KinematicTree,
     joints: Mapping[int, ExactJoint],
     q: Iterable[Number],
@@ -71,10 +71,10 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    `joints` is a result of `read_exact`. The order is from the root outwards: a joint comes after its parent
-    joint.
+    `joints` is a result of `read_exact_joints`. The order is from the root outwards: a joint comes after its
+    parent joint.
     """
-    q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
+    q, v, a = (list(map(as_interval, numbers)) for numbers in (q, v, a))
     states = {0: base or LinkState()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
     for i, exact_joint in joints.items():
@@ -89,17 +89,17 @@ def move(
             rates = multiplier * v[rate_at], multiplier * a[rate_at]
             z = _RECURSION.express(placed, axis)
             if kind.turns:
-                moved = _RECURSION.after_revolute(placed, axis, about(axis, coordinate), *rates)
+                moved = _RECURSION.after_revolute(placed, axis, rotation_about(axis, coordinate), *rates)
             else:
                 moved = _RECURSION.after_prismatic(placed, axis, coordinate, *rates)
             new = (Column(z, kind.turns, moved, i, rate_at, multiplier),)
         elif kind is JointKind.FIXED:
             moved = placed
         elif kind is JointKind.PLANAR:
-            S = about(IDENTITY[2], q[at + 2])
+            S = rotation_about(IDENTITY[2], q[at + 2])
             moved = _RECURSION.after_planar(placed, q[at:], S, v[rate_at:], a[rate_at:])
         elif kind is JointKind.FLOATING:
-            S = from_quaternion(q[at + 3 : at + 7])
+            S = rotation_from_quaternion(q[at + 3 : at + 7])
             moved = _RECURSION.after_floating(placed, q[at:], S, v[rate_at:], a[rate_at:])
         else:
             raise NotImplementedError(f"the motion of a {kind} joint")
@@ -118,19 +118,19 @@ def move(
 
 def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
     s = motion.states[link]
-    return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
+    return _as_array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
 
 def velocity_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the velocity (6,) of a link, [linear; angular]."""
     s = motion.states[link]
-    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
+    return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
 def acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the classical acceleration (6,) of a link, [linear; angular]."""
     s = motion.states[link]
-    return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
+    return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
@@ -143,17 +143,17 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
     if reference.at_world:
         linear = equations.point_velocity(linear, s.alpha, equations.minus((0, 0, 0), s.p))
-    return _array(_RECURSION.in_reference(s, reference, linear, s.alpha))
+    return _as_array(_RECURSION.in_reference(s, reference, linear, s.alpha))
 
 
 def jacobian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
-    return _array(found).reshape(motion.nv, 6).T
+    return _as_array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
-    return _array(found).reshape(motion.nv, 6).T
+    return _as_array(found).reshape(motion.nv, 6).T
 
 
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
@@ -161,9 +161,9 @@ def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDAr
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
         # Each number is multiplied separately, because NumPy cannot multiply an interval by an array.
-        out[of, by] += _array([factor * x for x in six])
+        out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
 
-def _array(numbers: Sequence[Any]) -> NDArray[np.object_]:
+def _as_array(numbers: Sequence[Any]) -> NDArray[np.object_]:
     return np.array(numbers, dtype=object)
