@@ -626,8 +626,8 @@ class JointComparison:
     frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
     `urdfkin.verify.usd_check.bound_single_precision_errors` computes w_i and e_i from the numbers of joint i.
     Let R_i be the constant rotation of joint i, and p_i the position of its origin. Let R*_i and p*_i be the
-    exact values. The angle of a product of rotations is at most the sum of their angles. The angle between the
-    product R_1 ... R_n and the product R*_1 ... R*_n is therefore at most
+    exact values. The angle of a product of rotations is at most the sum of their angles. The angle between
+    the product R_1 ... R_n and the product R*_1 ... R*_n is therefore at most
 
         e_1 + ... + e_n.
 
