@@ -64,8 +64,8 @@ _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: The coordinates of a target are the robot's size divided by these numbers.
-#: Such a target lies on no joint axis.
+#: Each coordinate of the assumed target is the sum of the model's lengths, divided by one of these numbers.
+#: With these divisors, the target hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
 #: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
@@ -336,7 +336,7 @@ def fit_model(
 def _general_target(model: CalibrationModel) -> FloatArray:
     """Return the parameters (p,) of the original model.
 
-    If the tool is fitted, its target is moved to a position that lies on no joint axis.
+    If the tool is fitted, the target gets another position, which hardly ever lies on a joint axis.
     """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):

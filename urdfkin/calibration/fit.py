@@ -73,10 +73,10 @@ from urdfkin.verify.singular_values import singular_values
 
 #: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: Maximum number of fitted parameters that a message lists for one fixed parameter.
+#: A message names at most this number of fitted parameters that have the same effect as a fixed parameter.
 _MAX_NAMES = 3
-#: A parameter stays fixed if fitted parameters together have the same effect; a message lists them.
-#: The message omits a fitted parameter that contributes at most this fraction of the effect.
+#: A parameter stays fixed if fitted parameters together have the same effect. A message lists these fitted
+#: parameters. The message omits a fitted parameter that contributes at most this fraction of the effect.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -191,7 +191,8 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
 _MIN_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
-#: The fit absorbs pose errors along the eigenvectors of these eigenvalues, so no residual shows such errors.
+#: Along the eigenvector of such an eigenvalue, the fitted parameters cancel a measurement error. The
+#: residuals then do not show this error.
 _EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20
@@ -401,7 +402,8 @@ class _LeastSquares:
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
         blocks = Q.reshape(len(self.measurements), k, len(self.free_parameters))
-        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # These are the diagonal blocks of I - H.
+        # `redundancy` contains the diagonal blocks of I - H, where H is the hat matrix.
+        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
         own = r.reshape(-1, k)
         inverse = np.linalg.pinv(redundancy, rcond=_EIGENVALUE_CUTOFF, hermitian=True)
         chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
@@ -442,10 +444,10 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
-    Each step resets the least significant parameter to its old value. The covariance determines how this
-    reset changes the other parameters. If the measurements determine only a combination of two parameters,
-    resetting one of the two can make the other significant. A `fixed` parameter is always selected. Unknown
-    entries of the covariance are inf.
+    Each step resets the least significant parameter to its old value. The covariance determines how the reset
+    of one parameter changes the other parameters. If the measurements determine only a combination of two
+    parameters, resetting one of the two can make the other significant. A `fixed` parameter is always
+    selected. Unknown entries of the covariance are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]

@@ -4,7 +4,8 @@ A model is a path (`urdfkin.model.path`): a product of constant poses and elemen
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
 joint's value by (1 + g). The joint's motion has the angle or length (1 + g) q, where q is the joint's value.
-The derivative of the tip's pose by g is therefore q times the pose's derivative by this angle or length.
+Let D be the derivative of the tip's pose by this angle or length. The derivative of the tip's pose by g is
+then q D.
 
 **URDF.** Each moving joint of the path has six parameters of its origin, and so has a fixed joint directly
 before the tip. Let T be the joint's original origin, and let A be the rotation that maps the z axis to the
@@ -94,7 +95,10 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Sum (m) of the model's lengths, or 1 if it is 0; a factor that converts radians to metres."""
+        """Sum (m) of the model's lengths, or 1 if the sum is 0.
+
+        The product of an angle in radians and this length is a distance in metres.
+        """
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -183,8 +187,8 @@ ORIGIN_PARAMETERS = (
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
 #: Order of preference for revolute (True) and prismatic (False) joints.
 #: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
-#: The parameter of the joint's zero comes first. The parameters that move the joint axis follow.
-#: Then come the parameters that move only the frame, and the gain is last.
+#: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
+#: The last parameters move only the frame, or scale the joint's value (gain).
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),

@@ -160,7 +160,7 @@ class Confirmed(TypedDict):
 
 
 class SameCertificate(Header):
-    """A statement whether two models describe the same robot, with proof data. Units are m and rad."""
+    """Answer to the question whether two models describe the same robot, with proof data, in m and rad."""
 
     a: CertifiedModel
     b: CertifiedModel

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
 #: Smallest numbers that are written without a unit prefix (0.9 m) and with a unit prefix (0.1 mm).
-#: They are slightly below 0.9 and 0.1, because printed numbers are rounded.
+#: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -68,7 +68,7 @@ class SameQuestion:
 
     `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
     models. With None, the question is whether the models are equivalent. If `strict` is true, the answer is
-    no for models with remarks. It is also no if the models are equivalent only after changes of B.
+    no for models with remarks. The answer is also no if the models are equivalent only after changes of B.
     """
 
     within: float | None = None
@@ -419,7 +419,7 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether each joint of the models differs by no more than its rounding to single precision.
+        """Whether the models differ, but each joint only by the rounding of its numbers to single precision.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single

@@ -62,7 +62,7 @@ from urdfkin.verify.verifier import as_verify
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: For the unchanged models, also the maximum number of frames whose largest distance is searched.
+#: The same number limits the frames whose largest distance is searched in the unchanged models.
 MAX_FARTHEST_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 MAX_PATH_LENGTH = 1e150
@@ -296,7 +296,7 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Return the alignment of the unchanged models, with the pairs of `alignment`."""
+        """Return the alignment of the unchanged models, with the joint and link pairs of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -420,7 +420,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If no position differs, the frame with the largest angle counts.
+        # If no position differs by more than rounding, the frame with the largest bound on the angle is used.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -580,8 +580,8 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame for unchanged models.
 
-    The two roots coincide, with one exception. If the root body of one model has a link with the name of
-    the other model's root, this link coincides with that root.
+    The two roots coincide, with one exception. The root body of one model may contain a link that has the
+    name of the other model's root. This link then coincides with the root of the other model.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -610,9 +610,9 @@ class JointComparison:
 
     **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
     may shift the origin of a joint along the joint's axis, and a converter may add or merge fixed links. The
-    proof therefore compares quantities that do not depend on the choice of frames. Let P be the nearest
-    ancestor (in A) of a link, such that both models have P. For each link that both models have, the proof
-    compares three quantities in the zero configuration, in the frame of P:
+    proof therefore compares quantities that do not depend on the choice of frames. For a link in A, let P be
+    the nearest ancestor that B also has. For each link that both models have, the proof compares three
+    quantities in the zero configuration, in the frame of P:
 
     - the pose of the link;
     - the direction and the line of the axis of each joint between P and the link;
@@ -634,12 +634,12 @@ class JointComparison:
     Let W be the position error (m) and E the rotation error (rad) of the frame before joint i. The position
     error of the frame after the joint is then at most
 
-        W + E |p_i| + w_i,
+        W + E |p_i| + w_i.
 
-    because R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes through the origin of
-    the frame after the joint, and is fixed in this frame. Therefore, the errors of the axis are at most the
-    position error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a
-    relative error of at most 2^-24.
+    The reason is the equation R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes
+    through the origin of the frame after the joint, and is fixed in this frame. Therefore, the errors of the
+    axis are at most the position error and the rotation error of this frame. The multiplier and the offset of
+    a mimic rule have a relative error of at most 2^-24.
 
     In B, P need not be an ancestor of the compared link: the paths to P and to the link may branch at a
     common ancestor. Let W and E be the position error and the rotation error of the link relative to this
@@ -649,19 +649,19 @@ class JointComparison:
     double precision, so these errors are added to the bounds. If both models are rounded, the bounds of both
     models are added.
 
-    **Both orders.** The bound for one joint can contain the rounding of other joints. One case is a joint
-    whose parent is a link that only B has. Another case is a path in B that passes other joints between P and
-    this joint. Therefore, `same` compares A with B, and also B with A. If the first of the two models is
-    rounded, the path from P to the link must have at most one moving joint. In the second model, no joint on
-    the path from the common ancestor to P may then have rounded numbers. If a condition does not hold, `same`
-    reports the difference as not explained.
+    **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
+    joint's parent may be a link that only B has. In B, the path from P to the joint may also contain other
+    joints. Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded,
+    the path from P to the link must have at most one moving joint. The second model must then have no rounded
+    numbers on the path from the common ancestor to P. If a condition does not hold, `same` reports the
+    difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
     smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
     detect this error. The proof does not cover planar joints, floating joints, joints in another order, and
-    links on different branches of A and B. These joints and links must agree up to double precision. If they
-    differ by more, `same` reports this difference as not explained.
+    links on different branches of A and B. These joints and links must agree up to double precision. `same`
+    reports a larger difference of such a joint or link as not explained.
 
     `errors` contains an array (joints, 3) of error bounds for A, and an array for B. The columns are the
     position error (m), the rotation error (rad), and the relative error of the mimic rule. The bounds are 0
@@ -779,7 +779,8 @@ class JointComparison:
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
         """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
 
-        Both joint lists begin at the last common ancestor. `back` leads to P, and `path` to the link.
+        Both joint lists begin at the last common ancestor. `back` lists the joints from this ancestor to P,
+        and `path` lists the joints from this ancestor to the link.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

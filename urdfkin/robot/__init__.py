@@ -812,7 +812,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
+        # A subclass of str may print a name differently in error messages. A plain str avoids this.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flatten_out(out, (4, 4))
@@ -914,9 +914,9 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the kinematic Hessian H (..., 6, nv, nv), the derivative of `jacobian` by each coordinate.
 
-        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of eq.
-        7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on v
-        alone.
+        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. The sum of
+        H[..., j] v[j] over all j is J-dot of eq. 7.126. The product v^T H v is the part of the acceleration
+        that depends only on v and q.
 
         Linear part of H[..., i, j] for revolute joints in LOCAL_WORLD_ALIGNED, where z_i is the axis of joint
         i, and d_i is the vector from joint i to the frame:
@@ -1089,8 +1089,8 @@ class Robot(Displayable):
         The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
         Jacobian, and an independent formula for the derivatives of the angles
         (`urdfkin.verify.analytical_reference`). Near the representational singularity of Euler angles, the
-        result has fewer correct digits. There, the bound grows as 1 / s^2, where s is the sine or cosine of
-        the middle angle.
+        result has fewer correct digits. Let s be the sine or cosine of the middle angle. Near the
+        singularity, the error bound grows as 1 / s^2.
 
         Args:
             representation: Euler sequence by SciPy's name, "rpy" (the same as "xyz": roll, pitch, yaw), or

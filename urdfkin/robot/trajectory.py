@@ -5,9 +5,9 @@ ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file does not contain are computed by central differences of the
 configurations, with an error proportional to the square of the time step. Joint accelerations that are
-computed from configurations have larger errors at the start and the end of the trajectory. There, the errors
-are proportional to the time step. To estimate all errors, the differences are also computed from every second
-sample.
+computed from configurations have larger errors at the start and the end of the trajectory. The errors at the
+start and the end are proportional to the time step. To estimate all errors, the differences are also computed
+from every second sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
@@ -115,7 +115,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Minimum number of samples; a second difference needs three.
 _MIN_SAMPLES = 3
-#: Arrays of an .npz file with the fields of `BaseMotion`.
+#: Names of the .npz arrays for the pose, the velocity and the acceleration of the root link.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: The user gets a note if the rounding error of times exceeds this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
@@ -211,9 +211,9 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # v = s' * step, and a = s'' * step, where s' and s'' are the derivatives of s by time.
-    # This is true for planar and floating joints too: `step` contains their twist in the moving frame, and
-    # this twist is constant.
+    # The velocity v is s' * step, and the acceleration a is s'' * step. Here s' and s'' are the first and the
+    # second time derivative of s. The same formulas hold for planar and floating joints. For such a joint,
+    # `step` contains the joint's constant twist in the axes of the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -598,7 +598,7 @@ def _check_columns(
 #: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
-#: The rotation in the opposite direction leads to the same pose, and is less than twice as large.
+#: A rotation in the opposite direction leads to the same pose, and its angle is less than twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.
