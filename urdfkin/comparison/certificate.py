@@ -160,7 +160,7 @@ class Confirmed(TypedDict):
 
 
 class SameCertificate(Header):
-    """Answer to the question whether two models describe the same robot, with proof data, in m and rad."""
+    """Certificate of whether two models describe the same robot, with the data of the proof in m and rad."""
 
     a: CertifiedModel
     b: CertifiedModel

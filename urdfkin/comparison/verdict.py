@@ -296,7 +296,7 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Return the alignment of the unchanged models, with the joint and link pairs of `alignment`."""
+        """Align the unchanged models; joints and comparable links are matched as in `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -650,9 +650,9 @@ class JointComparison:
     models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
-    joint's parent may be a link that only B has. In B, the path from P to the joint may also contain other
-    joints. Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded,
-    the path from P to the link must have at most one moving joint. The second model must then have no rounded
+    joint's parent may be a link that only B has. Or other joints may lie between P and this joint in B.
+    Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded, the
+    path from P to the link must have at most one moving joint. The second model must then have no rounded
     numbers on the path from the common ancestor to P. If a condition does not hold, `same` reports the
     difference as not explained.
 
