@@ -57,7 +57,8 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
-#: A warning is given if the residuals differ from the stated noise by more standard deviations than this.
+#: Maximum difference between the noise of the residuals and the stated noise, in standard deviations.
+#: A larger difference causes a warning.
 _NOISE_RATIO_SIGMAS = 4.0
 #: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
 _POORLY_OBSERVABLE_RATIO = 10.0

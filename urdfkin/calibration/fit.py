@@ -478,7 +478,7 @@ def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
     return degrees_of_freedom * (1.0 - step + NormalDist().inv_cdf(probability) * math.sqrt(step)) ** 3
 
 
-#: Maximum number of repetitions.
+#: Maximum number of repetitions in the computation of start values for base and tool.
 #: Each repetition computes the base's rotation, then the positions of base and target.
 _MAX_REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.

@@ -174,8 +174,8 @@ class ParametricChain:
 PARALLEL_TOLERANCE = math.radians(5.0)
 
 PARAMETER_SETS = ("base", "tool", "offsets", "origins", "gains")
-#: For each parameter of an origin: name, whether it is a rotation, and index of the coordinate axis.
-#: The motions are multiplied in this order.
+#: Name, kind and axis of each parameter of a joint origin. True means a rotation, False a translation.
+#: The axis is the index of a coordinate axis. The new origin is the product of the motions in this order.
 ORIGIN_PARAMETERS = (
     ("x", False, 0),
     ("y", False, 1),
@@ -322,7 +322,8 @@ class _ModelBuilder:
         preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
+        # Base and tool have the highest preference, because their values are unknown before the fit.
+        # The parameters of the joints are nearly known before the fit.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]
         )

@@ -42,24 +42,26 @@ _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: Root mean square errors (fraction of the reach, and rad) above which common mistakes are searched for.
+#: If an rms error of the fit exceeds its limit, the module searches for common mistakes in the data.
+#: The position limit is a fraction of the reach, and the orientation limit is in rad.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
-#: Difference of joint values (rad, m) below which two configurations count as one.
+#: Two configurations count as equal if their joint values, rounded to multiples of this number, are equal.
+#: The unit is rad or m.
 _ONE_CONFIGURATION = 1e-6
-#: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: Because of this subtraction, a change that the data determine poorly does not make a fit implausible.
-#: For example, positions determine the tilt of an axis poorly if the target is near the axis.
+#: This number of standard deviations is subtracted from a parameter's change.
+#: The remainder is compared with a limit, so that an uncertain change does not make a fit implausible.
+#: For example, measured positions of a target near an axis leave the tilt of this axis uncertain.
 _UNCERTAIN = 5.0
-#: Maximum error after a correction, divided by the error before the correction.
+#: Maximum error after a correction of the data, divided by the error before the correction.
 #: `_NOT_WORSE` applies if the fit is not plausible, or if a joint zero changed by half a turn.
 #: Otherwise `_BETTER` applies.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections for which the parameters are fitted again.
-#: These corrections have the smallest errors if only base and tool are computed.
+#: Number of corrections of the data for which the parameters are fitted again.
+#: The chosen corrections have the smallest errors in a fit of only base and tool.
 _MAX_FITS = 4
-#: Numbers of rows by which a correction shifts q relative to the poses.
+#: A possible correction of the data shifts the rows of q relative to the poses by one of these numbers.
 _SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 

@@ -47,14 +47,15 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders; lowercase letters are fixed axes, uppercase letters moving axes.
+#: SciPy's name of each order of roll, pitch and yaw.
+#: Uppercase letters mean moving axes, and lowercase letters mean fixed axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of random configurations for the fit of the origins, and for its check.
 _FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.
-#: The numbers in the file have nine digits, and rounding causes residuals of this size.
+#: The calibration file rounds numbers to nine digits, which causes residuals near this limit.
 _MAX_RESIDUAL = 1e-8
 _DISTANCE_SAMPLES = 1000
 

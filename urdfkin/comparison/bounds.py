@@ -41,9 +41,9 @@ from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
 RANDOM_SAMPLES = 512
-#: Number of sampled configurations in which each variable is at an end of its range.
+#: Number of sampled configurations in which every joint variable is at an end of its range.
 CORNER_SAMPLES = 128
-#: Number of sampled configurations from which the search for one frame starts.
+#: For each frame, the search for the largest distance starts at this number of sampled configurations.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
 VALUES_PER_STEP = 13
@@ -77,13 +77,13 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose of B's base link in A's root frame, in A's zero configuration.
+        #: Pose (4, 4) of B's base link in A's root frame, while A is in its zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
         #: Whether the base link belongs to the same rigid body as the root link, for each robot.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether joints between a robot's root and its base link change the distances.
+        #: Whether a moving joint between a robot's root and its base link changes the distances.
         #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
@@ -271,7 +271,8 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-#: Maximum number of boxes in memory. The search for the bound of one frame then takes one or two seconds.
+#: Maximum number of boxes in memory.
+#: With this number of boxes, the bound of one frame takes one or two seconds.
 MAX_BOXES = 2**17
 #: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BOXES_PER_BATCH = 2**16
@@ -351,7 +352,7 @@ def tighten(
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
     # An unlimited revolute joint repeats its poses after one turn.
-    # Other unlimited ranges cannot be divided into boxes.
+    # The unlimited range of any other joint cannot be divided into boxes.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)

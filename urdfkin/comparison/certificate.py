@@ -33,7 +33,7 @@ from urdfkin.verify.oracles import PINOCCHIO, versions
 #: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
 MAX_RECHECK_BOXES = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
-#: The machine that wrote the certificate may have other rounding errors.
+#: The tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound, in units of the machine epsilon.
 _BOUND_TOLERANCE = 64.0

@@ -770,7 +770,7 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
     # `same` can store a mimic joint with the multiplier 0 as a fixed joint.
-    # The child link of this joint is not a tool.
+    # The child link of such a fixed joint is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
             return False

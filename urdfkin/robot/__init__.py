@@ -166,7 +166,7 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Evaluators of `prepare`, by frame. Pinocchio checks only the results of those in `_checked`.
+        #: Evaluators of `prepare`, by frame. Pinocchio checks only the results of evaluators in `_checked`.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -1661,9 +1661,9 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # A plain name is a fast key; the hash of an enumeration member is slow.
-        # All other keys contain the type of `frame`: `LinkFrame("link:a") == "link:a"`, but the two differ in
-        # meaning.
+        # The key is a plain name where possible, because the hash of an enumeration member is slow.
+        # All other keys contain the type of `frame`. The reason is that `LinkFrame("link:a") == "link:a"`,
+        # although `LinkFrame("link:a")` and the str "link:a" can name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
