@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
-#: Residuals below this fraction of the noise are only rounding errors.
+#: If the ratio of residuals to estimated noise is below this number, only rounding causes the residuals.
 _ROUNDING = 0.5
 
 

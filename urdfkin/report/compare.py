@@ -180,7 +180,7 @@ def _cell(value: Units | str) -> str:
 #: Growth by a smaller factor is normal, because the samples are random.
 GROWTH_FACTOR = 2.0
 #: If a disagreement (in eps * scale) grows to at most this number, the growth is not a regression.
-#: A single rounding error can be as large.
+#: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
 #: If the ratio of a disagreement to its bound grows to at most this number, the growth is not a regression.
 _BOUND_RATIO_FLOOR = 0.1
@@ -190,8 +190,8 @@ _BOUND_RATIO_FLOOR = 0.1
 class ReportChange:
     """A difference between two reports.
 
-    `robot` is None if the difference is about the whole run. `old` or `new` is empty if this report has no
-    value.
+    `robot` is None if the difference is about the whole run. `old` is empty if the old report has no value,
+    and `new` is empty if the new report has no value.
     """
 
     robot: str | None

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Left end of the x axis, in multiples of eps * scale. The plot counts smaller disagreements as exact.
+#: Left end of the x axis, in multiples of eps * scale.
+#: The percentage at the left end is the share of results with smaller disagreements.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82

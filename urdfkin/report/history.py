@@ -37,7 +37,8 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs that have a mark on a terminal, and number of latest runs in the charts of the page.
+#: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
+#: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
@@ -115,7 +116,8 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: For each source of a robot, pairs (index of the run, change). The key None is for changes of the whole run.
+#: Each key is the source of a robot, or None for changes of a whole run.
+#: Each value is a list of pairs: the index of a run, and a change.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 

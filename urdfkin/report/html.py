@@ -61,7 +61,7 @@ _FAILURES_OPEN = 20
 #: If a report has more robots than this number, only robots that are not verified have histograms.
 #: The reason is computing time: the histograms of one robot take a second.
 _MAX_DRAWN = 100
-#: Maximum number of characters of details in one page; with more, each robot has a separate file.
+#: If the details have more characters than this number, each robot has a separate file.
 MOST = 5_000_000
 
 
@@ -272,7 +272,10 @@ def format_date(started: str) -> str:
 
 
 class NotebookView:
-    """The 3D view of `Robot.view` in a notebook: `q` (nq,) is the first configuration, `height` is in px."""
+    """The 3D view of `Robot.view` in a notebook.
+
+    `q` (nq,) is the first configuration, and `height` is the height of the view in pixels.
+    """
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
         self._name, self._height = robot.name, height

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_document(out: Console, document: TextDocument) -> None:
-    """Print a document without wrapping sentences, so that a reader can copy them."""
+    """Print a document. Each sentence stays on one line, so that a reader can copy the sentence."""
     if document.title:
         out.print(document.title, style="bold")
     for part in document.parts:

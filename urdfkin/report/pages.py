@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's colour steps: ratios of a disagreement to its bound.
+#: Upper limit of each colour step in the heat map. A limit is a ratio of a disagreement to its bound.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -191,10 +191,11 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
-    """Return an upper limit of (disagreement / error bound) for one frame, joint or column.
+    """Return an upper limit of the ratio of a disagreement to its error bound.
 
-    The document has no error bound for a single frame, joint or column. This function therefore divides the
-    disagreement by the check's smallest error bound. The result never exceeds the check's largest ratio.
+    The disagreement is the largest of one frame, joint or column. The document has no error bound for a
+    single frame, joint or column. This function therefore divides the disagreement by the check's smallest
+    error bound. The result never exceeds the check's largest ratio.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.

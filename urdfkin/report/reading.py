@@ -107,7 +107,10 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Yield errors of the indices in q and v. A mimic joint has the indices of its mimicked joint."""
+    """Yield errors of the indices of joints, and of the numbers of coordinates and joint velocities.
+
+    A joint has an index in q and an index in v. A mimic joint has the indices of its mimicked joint.
+    """
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
@@ -266,7 +269,7 @@ def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # Without a comparison, there is no bound.
+        # The lower end of `bound` exceeds the upper end if nothing was compared.
         if ratio or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but the check has a disagreement"
         return

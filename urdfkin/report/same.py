@@ -32,16 +32,16 @@ from urdfkin.report.markdown import table_lines
 from urdfkin.report.words import format_count
 from urdfkin.robot import Robot
 
-#: Number of lines for each kind of difference that are shown without --all.
+#: Maximum number of printed lines for each kind of difference, if the option --all is not given.
 SHOWN = 12
-#: Line for models that differ, if the names or the order of their joints differ.
+#: Message about two different models whose joints have different names or a different order.
 GUESSED = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances up to FACTOR * (rounding error) count as rounding errors and are not printed.
+#: A distance or angle of at most FACTOR times the bound on rounding errors is not printed.
 #: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
 #: Heading for joints that can move a mimic joint beyond the limits of the mimic joint.
@@ -139,7 +139,8 @@ def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
     The table has the distances after the changes of B. The verdict "same up to single precision" is about the
-    unchanged models. Therefore, if the models have this verdict, the heading lists the changes of B.
+    unchanged models. Therefore, the heading lists the changes of B if the models are the same up to single
+    precision.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -154,7 +155,8 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 def describe_as_written(sameness: Sameness) -> str:
     """Describe the largest distance between matching frames of A and the unchanged B.
 
-    The text is empty if B needs no changes, or if rounding errors explain the distance.
+    The text is empty if model B needs no changes to match model A. The text is also empty if rounding errors
+    explain the distance.
     """
     frame = sameness.as_written
     off = "" if frame is None else _off(frame, sameness.rounding)
@@ -164,8 +166,8 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Describe the configuration at which a lower bound is attained, with units.
 
-    The text has the nonzero coordinates of A. A joint of B that matches no independent joint of A has its own
-    coordinate; the text also has these coordinates, if they are not 0.
+    The text has the nonzero coordinates of A. It also has the nonzero coordinates of each joint of B that
+    matches no independent joint of A.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -194,7 +196,10 @@ def describe_renames(sameness: Sameness) -> list[str]:
 
 
 def document(sameness: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the answer with reasons; without `all_`, at most `SHOWN` lines of each kind."""
+    """Return the verdict on two models, with the differences and changes that explain the verdict.
+
+    Without `all_`, the document has at most `SHOWN` lines of each kind.
+    """
     parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(sameness), strict=True)]
     head = headline(sameness, question)
     parts.append(Strong(head, "bold green" if sameness.holds(question) else "bold red"))
@@ -328,7 +333,8 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: Half the side length of a picture (units of the SVG), and fraction of the picture that the robots fill.
+#: `HALF` is half the side length of a picture, in units of the SVG.
+#: `FILLED` is the fraction of the side length that the robots fill.
 HALF, FILLED = 150.0, 0.9
 #: Maximum length of the scale bar, relative to the side length of a picture.
 MAX_SCALE_BAR = 0.3
@@ -392,8 +398,8 @@ def pictures(
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
     Without `worst`, the robots are in the zero configuration. With `written`, B is drawn without the changes
-    that make B equivalent to A. Each view has three groups of lines (x, y, x, y): the lines of A, the lines
-    of B, and the lines that connect A with B.
+    that make B equivalent to A. A line is given by the x and y of its two ends. Each picture has the lines
+    of A and the lines of B. The enlarged picture also has a line between the two frames.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()

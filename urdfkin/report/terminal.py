@@ -47,8 +47,8 @@ _WIDE = 100
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report.
 
-    For each failed check, print the command that computes the worst case again. With `cases`, print this
-    command for every check.
+    For each failed check, print the command that computes the worst case again. With `cases`, print the
+    command for every check, failed or not.
     """
     robots = document["robots"]
     out.print(

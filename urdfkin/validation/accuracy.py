@@ -48,7 +48,8 @@ from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_r
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
-#: Angles about fixed axes are in no group: the Jacobian of Euler angles has the same rows in reverse order.
+#: The study omits angles about fixed axes.
+#: The Jacobian of these angles has the same rows as a Jacobian of Euler angles, in reverse order.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -199,8 +200,8 @@ class _AccuracyBatch:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return the indices (n, links, m) of the nonzero columns of each link's Jacobian.
 
-    m is the largest number of nonzero columns. If a link has fewer, the remaining indices are those of
-    zero columns.
+    m is the largest number of nonzero columns of a Jacobian. If a Jacobian has fewer nonzero columns, its
+    remaining indices are indices of zero columns.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

@@ -142,7 +142,7 @@ def validate(
             if saved is not None:
                 campaign.load_answers(saved)
             for i, error in unread.items():
-                # After this failure, no chunk of the robot is missing, so the loop ends after one chunk.
+                # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
             missing = [
@@ -226,8 +226,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: Kernels save time if the number of samples is larger than these numbers.
-#: The first number is for kernels on disk, and the second for kernels that must be compiled.
+#: If a run has more samples than _WORTH_LOADING, compiled kernels on disk save time.
+#: If a run has more samples than _WORTH_COMPILING, even kernels that must be compiled first save time.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

@@ -41,13 +41,13 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
-#: Number of samples in one draw.
+#: Maximum number of random configurations in one draw; each draw has its own seed.
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
 #: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
 _MIN_CHUNKS = 8
-#: Maximum number of draws in a chunk.
+#: Maximum number of draws in a chunk; a draw has at most DRAW_SIZE random configurations.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.
 _MAX_DRAWS = 40
 
@@ -99,7 +99,7 @@ class Timings:
     second: float = 0.0
 
     def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function. Add its computing time (s) to the attribute named by `part`, such as "urdfkin"."""
+        """Call a function, and add the time of the call (s) to the attribute `part`, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)
@@ -240,7 +240,7 @@ class _Block(_ComparisonBatch):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot's cache keeps the compiled tree for all frames, but not a compiled tree for some frames.
+        # The robot caches a compiled tree for all frames. A compiled tree for some frames is not cached.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
@@ -348,8 +348,8 @@ def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> Fl
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: Cache of the latest robot, because a worker gets the chunks of a robot one after another.
-#: Two large robots at a time would need too much memory.
+#: The cache contains only the latest robot. A worker gets the chunks of a robot one after another.
+#: Two large robots in the cache would need too much memory.
 _cache: dict[RobotInput, _Models] = {}
 
 

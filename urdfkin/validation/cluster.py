@@ -38,11 +38,13 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At any time, at most _PER_THREAD * (threads of all workers) + _MORE sent chunks have no answer yet.
+#: A chunk is sent only if fewer than _PER_THREAD * threads + _MORE sent chunks have no answer.
+#: The number of threads is the sum over all workers.
 #: With this number of chunks, no thread waits for its next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: The number can be high: a robot cannot crash a Dask worker, because each chunk runs in a separate process.
+#: A high number is safe, because a robot cannot crash a Dask worker.
+#: The worker runs each chunk in a separate process.
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
@@ -90,7 +92,7 @@ def _client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Delete the failed client in this thread: if another thread deleted it, Dask would wait for ever.
+        # Delete the failed client in this thread. If another thread deleted the client, Dask would hang.
         gc.collect()
         keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -110,7 +112,10 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class that starts no web server, because all users of the machine could open Dask's web page."""
+    """Base class of a scheduler and a worker without a web server.
+
+    All users of the machine could open the web page of Dask.
+    """
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
 
@@ -199,7 +204,7 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: For each chunk without an answer: the task, and how many times the chunk was sent.
+        #: Each chunk without an answer has its task and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
         #: Texts of robots that the workers store.
         self._robots: dict[int, Future[bytes]] = {}
@@ -268,7 +273,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as lost:  # The scheduler, which transfers results, is lost.
+            except OSError as lost:  # The connection to the scheduler is lost.
                 raise self._make_lost_error() from lost
             return _answer(result, task)
         if self._client.status != "running":

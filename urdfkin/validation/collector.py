@@ -153,8 +153,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # The number of results after a failed chunk depends on the workers' speed.
-        # Therefore, these results are left out.
+        # The results after a failed chunk are left out.
+        # The number of these results depends on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -3,8 +3,8 @@
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
 results with the user's results. A mistake is reported if the mistake makes the largest difference at least a
-thousand times smaller, or if it explains a column of a Jacobian. If several mistakes explain the results, up
-to three are reported.
+thousand times smaller. A mistake that explains a column of a Jacobian is also reported. If several mistakes
+explain the results, up to three are reported.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 #: Largest remainder (see `Diagnosis.remainder`) at which a mistake explains the results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
-#: Number of configurations in a first, fast test for two exchanged joints.
+#: Number of configurations in a fast test whether two joints are exchanged.
+#: The other configurations are compared only if this test succeeds.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
@@ -50,7 +51,7 @@ class Diagnosis:
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         scale: Scale of each number in `expected`. The bound of a number is k * eps * scale.
-        compute: A function (inputs, frame, reference) that returns urdfkin's results.
+        compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
     inputs: Inputs
@@ -60,9 +61,10 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the largest difference of `actual` from `predicted`, divided by that from `expected`.
+        """Return the largest difference with a mistake, divided by the difference without a mistake.
 
-        `predicted` contains urdfkin's results with a mistake: the first n results, or all if n is None.
+        `predicted` contains urdfkin's results with the mistake, for the first n configurations. If n is None,
+        `predicted` contains the results for all configurations.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -410,7 +412,10 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield 0.0 and a sentence for each column that has the wrong sign, is zero or is another column."""
+    """Yield a sentence for each column that has the wrong sign, is zero or is another column.
+
+    The number before each sentence is the remainder, which is 0.0 for these mistakes.
+    """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

@@ -446,7 +446,7 @@ class RunOutcome:
 
     @property
     def verdict(self) -> str:
-        """The verdict of the run, which belongs to `exit_code`: a verdict on a robot, or "interrupted"."""
+        """The verdict on the run: "verified", "disagrees", "not verified", "bad input" or "interrupted"."""
         return OUTCOMES[self.exit_code]
 
     @property

@@ -49,8 +49,8 @@ class CrossCheck:
 
     Attributes:
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
-        undecided: Number of results without a majority: no two of the three libraries agree, or one library
-            agrees with two others that disagree with each other.
+        undecided: Number of results without a majority. Either no two of the three libraries agree, or
+            exactly two of the three pairs of libraries agree.
     """
 
     by: str
@@ -118,7 +118,7 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Add two bounds k * eps * scale. The sum has the k of the second bound and a new scale."""
+    """Return the sum of two bounds k * eps * scale. The factor k of the sum is the factor k of `second`."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)

@@ -529,8 +529,9 @@ class _Run:
         The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
         angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has an
         error of up to 2 eps |q|. Each term of the result is a product of rotated vectors. Each joint may
-        rotate each of these vectors, so the errors of all joints and vectors are added. The matrix that
-        converts the velocities of a planar or floating joint adds at most 16 rounding errors.
+        rotate each of these vectors. Therefore, the errors of all rotation matrices are added for each
+        vector. The matrix that converts the velocities of a planar or floating joint adds at most 16 rounding
+        errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -566,7 +567,7 @@ class _Run:
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
             return
-        if total.bound_ratio <= 1.0:  # Only exceptions or wrong shapes: no difference needs an explanation.
+        if total.bound_ratio <= 1.0:  # No difference is too large, so no difference needs an explanation.
             return
         if total.eps_scale * EPS <= _SINGLE_PRECISION and math.isfinite(total.bound_ratio):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"

@@ -18,12 +18,12 @@ from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
 #: Maximum number of bytes of one array in a block of frames.
-#: About ten arrays of this size exist at a time.
+#: Up to _ARRAYS arrays of this size exist at the same time.
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for the workspace, and _PER_LINK bytes for each link.
-#: These numbers were measured.
+#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace. It needs _PER_LINK bytes for each link.
+#: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
 _ARRAYS = 12
@@ -40,7 +40,7 @@ def limit(processes: int = 1) -> int | None:
 def frame_bytes(samples: int, nv: int) -> int:
     """Return the size in bytes of one frame's largest array.
 
-    This array contains the Jacobians, or the placements if nv is at most 2.
+    The largest array contains the Jacobians. If nv is at most 2, the largest array contains the placements.
     """
     return samples * 8 * max(16, 6 * nv)
 

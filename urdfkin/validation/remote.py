@@ -20,10 +20,11 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run`. The first item is one of three words, and the second item depends on the word.
-#: The second item of "answer" is the pickled answer.
-#: The second item of "died" is the signal or exit status of the second crash.
-#: The second item of "other code" contains the worker's versions, if they differ from the client's.
+#: Return value of `run`: a word, and data that depend on the word.
+#: After the word "answer", the data are the pickled answer.
+#: After the word "died", the data are the signal or exit status of the chunk's second crash.
+#: After the words "other code", the data are the worker's versions and digests.
+#: The worker returns "other code" if its versions or digests differ from the client's.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

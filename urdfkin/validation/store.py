@@ -343,8 +343,9 @@ def _is_ours(path: Path) -> bool:
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Return the store with its manifest.
 
-    The manifest is written if the folder has none, or for a retry after the files of failed robots changed.
-    In all other cases, the folder keeps its manifest, because the manifest contains the original start time.
+    The manifest is written if the folder has no manifest. With `retry_failed`, the manifest is also written
+    if only the files of failed robots have changed. In all other cases, the folder keeps its manifest,
+    because the manifest contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -403,7 +404,7 @@ def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # Another process may hold the lock for a moment, to test the lock.
+        time.sleep(0.1)  # A process that only tests the lock holds the lock for a moment.
     raise InputError(
         "another process uses this store",
         where=str(folder),

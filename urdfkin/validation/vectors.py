@@ -60,7 +60,7 @@ from urdfkin.verify.quantities import (
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration.
-#: If a joint's limits exclude zero, the joint is at the limit nearest to zero instead.
+#: If the limits of a joint exclude zero, the first configuration has the joint at the limit nearest to zero.
 SAMPLES = 3
 #: Largest absolute value of velocities, of accelerations, and of positions of planar and floating joints.
 _RANGE = 2.0
@@ -68,7 +68,7 @@ _RANGE = 2.0
 #: A multiple of 1 / 1024 has at most ten decimals, and a double represents it without rounding.
 _GRID = 1024.0
 #: A tolerance is rounded to 12 digits, and then rounded up to 3 digits.
-#: Results of different processors differ in the last digits; the first rounding removes these digits.
+#: The rounding to 12 digits removes the last digits, which differ between processors.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -396,7 +396,7 @@ def _sample(
 def _results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of a sample; a value that is not proven to 17 digits is None."""
+    """Yield the results of a sample. A value is None if its error is too large for 17 digits."""
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)

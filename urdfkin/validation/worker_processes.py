@@ -49,7 +49,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Close the worker's end in this process. Otherwise the pipe stays open when the worker ends.
+            # Close the worker's end of the pipe in this process.
+            # If this process kept that end open, the pipe would stay open after the worker ends.
             theirs.close()
 
     @property
@@ -115,7 +116,10 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent ends; on Linux, the kernel ends it, even if compiled code hangs."""
+    """End this process when its parent process ends.
+
+    On Linux, the operating system ends the process, even if compiled code hangs.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -150,7 +154,7 @@ class _WorkerPool:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Tasks to run again, for each robot whose worker process crashed.
+        #: For each robot that crashed a process, the tasks that will run again.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
@@ -181,7 +185,7 @@ class _WorkerPool:
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
-                    # A running process takes the task later.
+                    # Another worker process runs the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._enter_answer(task, make_lost_failure("no process could be started", error))
