@@ -82,7 +82,7 @@ def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("what", "word"),
-    [("self.share_of_bound <= 1.0  ->  self.share_of_bound < 1.0", "survived"), ("1.0  ->  1.5", "noticed")],
+    [("self.bound_ratio <= 1.0  ->  self.bound_ratio < 1.0", "survived"), ("1.0  ->  1.5", "noticed")],
 )
 def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

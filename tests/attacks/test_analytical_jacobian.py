@@ -88,7 +88,7 @@ def test_the_analytical_jacobian_is_verified_in_each_representation(representati
         for base in (None, BaseMotion(pose(rotation_from_euler("ZYZ", [0.3, 0.7, 1.1])))):
             robot.analytical_jacobian(robot.sample(200, 11), robot.tip_frame, representation, base=base)
         assert robot.certificate().verified
-        assert robot.certificate().lines[0].share_of_bound < 0.25
+        assert robot.certificate().lines[0].bound_ratio < 0.25
 
 
 @pytest.mark.slow
@@ -114,9 +114,7 @@ def test_near_the_singularity_the_analytical_jacobian_is_verified_and_the_bound_
             assert distance < 1e-12
         # This result is not counted as checked.
         assert np.isfinite(free.analytical_jacobian(q, "body", name, nearest=0.0, verify=False)).all()
-    assert (
-        next(x for x in free.certificate().lines if x.quantity == "analytical jacobian").share_of_bound < 0.5
-    )
+    assert next(x for x in free.certificate().lines if x.quantity == "analytical jacobian").bound_ratio < 0.5
 
 
 @pytest.mark.parametrize("name", ["ZYZ", "xyz"])

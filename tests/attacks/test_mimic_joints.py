@@ -75,7 +75,7 @@ def test_chains_of_mimic_joints_are_verified_at_any_angle(far: float) -> None:
         robot.placement(q, robot.link_frames)
         robot.jacobian(q, robot.link_frames)
         robot.acceleration(q, v / far, a / far, robot.link_frames)
-        assert all(line.share_of_bound < 0.3 for line in robot.certificate().lines)
+        assert all(line.bound_ratio < 0.3 for line in robot.certificate().lines)
 
 
 def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:

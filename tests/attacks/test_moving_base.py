@@ -108,7 +108,7 @@ def test_errors_on_a_rotated_base_are_well_within_the_bound(reference: str) -> N
     arm.jacobian(q, ["a", "b"], reference, base=base)
     arm.acceleration(q, v, a, ["a", "b"], reference, base=base)
     assert arm.certificate().verified
-    assert max(line.share_of_bound for line in arm.certificate().lines) < 0.2
+    assert max(line.bound_ratio for line in arm.certificate().lines) < 0.2
 
 
 def test_only_a_rotated_base_counts_as_a_joint_in_the_bound() -> None:

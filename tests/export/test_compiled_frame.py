@@ -46,7 +46,7 @@ def test_compiled_results_agree_with_pinocchio_and_are_equal_in_single_calls_and
     certificate = robot.certificate()
     checked = [line for line in certificate.lines if line.checked]
     assert len(checked) == len(asked)
-    assert all(line.checked == 103 and line.share_of_bound < 1.0 for line in checked)
+    assert all(line.checked == 103 and line.bound_ratio < 1.0 for line in checked)
     assert all(line.unchecked == 3 * 37 for line in certificate.lines)
 
 

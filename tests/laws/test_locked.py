@@ -111,7 +111,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: OracleLibrary
         locked.acceleration(q, v, a, locked.link_frames, reference, verify=True)
         locked.jacobian_rate(q, v, locked.link_frames, reference, verify=True)
     assert locked.certificate().verified
-    assert all(line.share_of_bound > 0.0 or not locked.nv for line in locked.certificate().lines)
+    assert all(line.bound_ratio > 0.0 or not locked.nv for line in locked.certificate().lines)
 
 
 @pytest.mark.parametrize("name", ["panda", "a1"])

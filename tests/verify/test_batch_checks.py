@@ -180,7 +180,7 @@ def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_
         of = {"placement": 3, "acceleration": 3}.get(line.quantity, 1)
         assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
         assert line.worst > 0.0
-        assert 0.0 < line.share_of_bound < 1.0
+        assert 0.0 < line.bound_ratio < 1.0
     assert len(certificate.lines) == 6
     assert not certificate.verified
     assert certificate.not_verified == ('verify="sample" checks 100 configurations of a call',)

@@ -94,7 +94,7 @@ def test_unchecked_calls_of_a_prepared_frame_and_checked_calls_have_one_certific
     assert certificate.verified  # preparing returns no result
     assert certificate.oracle.startswith("Pinocchio 4.")
     assert 0.0 < certificate.lines[0].worst < 100.0
-    assert 0.0 < certificate.lines[0].share_of_bound < 1.0
+    assert 0.0 < certificate.lines[0].bound_ratio < 1.0
     fast.jacobian(q[0])
     robot.velocity(q, q, FRAME)
     certificate = robot.certificate()
@@ -168,7 +168,7 @@ def test_a_certificate_states_the_check_of_the_reader_if_there_was_a_check(readi
 def test_a_fraction_of_the_bound_that_is_nan_is_preserved_in_a_sum_of_comparisons(other: float) -> None:
     wrong, right = BatchComparison(1, np.nan, np.nan, (3,)), BatchComparison(2, 1.0, other, (4,))
     for both in (wrong + right, right + wrong):
-        assert np.isnan(both.share_of_bound)
+        assert np.isnan(both.bound_ratio)
         assert np.isnan(both.worst)
         assert not both.agrees
         assert both.result_count == 3

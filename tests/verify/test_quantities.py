@@ -83,7 +83,7 @@ def test_a_new_quantity_is_computed_checked_and_certified() -> None:
     np.testing.assert_array_equal(found, six[..., 3:])
     (line,) = (line for line in robot.certificate().lines if line.quantity == "angular velocity")
     assert (line.checked, line.unchecked) == (10, 0)
-    assert 0.0 < line.share_of_bound < 1.0
+    assert 0.0 < line.bound_ratio < 1.0
 
 
 def test_an_error_of_a_new_quantity_is_detected_with_a_command_that_repeats_the_computation(

@@ -38,9 +38,7 @@ def _compiled() -> Iterator[None]:
 
 
 def entries(robot: Robot) -> dict[str, tuple[int, float, float, int]]:
-    return {
-        x.quantity: (x.checked, x.worst, x.share_of_bound, x.unchecked) for x in robot.certificate().lines
-    }
+    return {x.quantity: (x.checked, x.worst, x.bound_ratio, x.unchecked) for x in robot.certificate().lines}
 
 
 @pytest.mark.slow

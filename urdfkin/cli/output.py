@@ -207,7 +207,7 @@ def format_check_line(certificate: Certificate) -> str:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
     parts = [
         f"{format_count(line.checked, f'{line.quantity} result')}, worst disagreement"
-        f" {line.worst:.2g} eps*scale ({line.share_of_bound:.1%} of the bound)"
+        f" {line.worst:.2g} eps*scale ({line.bound_ratio:.1%} of the bound)"
         for line in certificate.lines
     ]
     return f"verified by {by}: {'; '.join(parts)}"

@@ -94,7 +94,7 @@ class Proof:
         else:
             verdict = [f"Verified by {oracle}, the expressions below evaluated {self.precision_text}:"] + [
                 f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
-                f" eps*scale, {line.share_of_bound:.2%} of the bound"
+                f" eps*scale, {line.bound_ratio:.2%} of the bound"
                 for line in self.certificate.lines
             ]
         return [

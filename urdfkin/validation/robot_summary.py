@@ -139,7 +139,7 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
         "samples": checks[0].samples,
         "metres": max(check.metres for check in checks),
         "worst": max(units for check in checks for units in check.units.values()),
-        "bound_ratio": max(share for check in checks for share in check.shares_of_bound.values()),
+        "bound_ratio": max(share for check in checks for share in check.bound_ratios.values()),
     }
 
 

@@ -80,14 +80,14 @@ class CertificateLine:
         checked: Number of results that the oracle confirmed.
         worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
             scale.
-        share_of_bound: Largest ratio of a difference to its bound.
+        bound_ratio: Largest ratio of a difference to its bound.
         unchecked: Number of results that were not checked.
     """
 
     quantity: str
     checked: int
     worst: float
-    share_of_bound: float
+    bound_ratio: float
     unchecked: int
 
 
@@ -100,7 +100,7 @@ class LineEntry(TypedDict):
         Size | None,
         doc("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
     ]
-    share_of_bound: Annotated[
+    bound_ratio: Annotated[
         Size | None, doc("Largest ratio of a difference to its bound; null: the ratio is not finite.")
     ]
     unchecked: Annotated[Count, doc("Number of results that were returned without a check.")]
@@ -170,7 +170,7 @@ class Certificate(Displayable):
         True
         """
         return any(line.checked for line in self.lines) and not any(
-            line.unchecked or not line.share_of_bound <= 1.0 for line in self.lines
+            line.unchecked or not line.bound_ratio <= 1.0 for line in self.lines
         )
 
     def as_dict(self) -> CertificateDocument:
@@ -216,7 +216,7 @@ class Certificate(Displayable):
     def _text_document(self) -> TextDocument:
         heads = ("quantity", "checked", "not checked", "worst [eps*scale]", "of the bound")
         rows = [
-            (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.share_of_bound:.1%}")
+            (x.quantity, str(x.checked), str(x.unchecked), f"{x.worst:.2g}", f"{x.bound_ratio:.1%}")
             for x in self.lines
         ]
         word = "verified" if self.verified else "NOT verified"
@@ -235,7 +235,7 @@ class Certificate(Displayable):
             head += f", computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})"
         rows = [head] + [
             f"  {line.quantity}: {line.checked} checked, worst {line.worst:.2g} eps*scale"
-            f" ({line.share_of_bound:.1%} of the bound)"
+            f" ({line.bound_ratio:.1%} of the bound)"
             + (f", {line.unchecked} not checked" if line.unchecked else "")
             for line in self.lines
         ]
@@ -263,7 +263,7 @@ class Account:
     def line(self, quantity: str) -> CertificateLine:
         found = self.checked
         unchecked = self.unchecked + self.count_disabled_checks()
-        return CertificateLine(quantity, found.result_count, found.worst, found.share_of_bound, unchecked)
+        return CertificateLine(quantity, found.result_count, found.worst, found.bound_ratio, unchecked)
 
     def count_disabled_checks(self) -> int:
         return self.disabled_checks + sum(int(counts[index]) for counts, index in self.counters)

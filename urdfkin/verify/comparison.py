@@ -29,13 +29,13 @@ class BatchComparison:
 
     Attributes:
         worst: Largest difference of two numbers, in multiples of eps * scale.
-        share_of_bound: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
+        bound_ratio: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
         index: Index in each batch axis of the result with the largest ratio.
     """
 
     result_count: int = 0
     worst: float = 0.0
-    share_of_bound: float = 0.0
+    bound_ratio: float = 0.0
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
@@ -43,20 +43,20 @@ class BatchComparison:
 
         `index` comes from the batch with the larger `share`. NaN counts as larger than any number.
         """
-        second_is_larger = other.share_of_bound > self.share_of_bound or (
-            np.isnan(other.share_of_bound) and not np.isnan(self.share_of_bound)
+        second_is_larger = other.bound_ratio > self.bound_ratio or (
+            np.isnan(other.bound_ratio) and not np.isnan(self.bound_ratio)
         )
         first, second = (other, self) if second_is_larger else (self, other)
         return BatchComparison(
             self.result_count + other.result_count,
             float(np.maximum(self.worst, other.worst)),
-            first.share_of_bound,
+            first.bound_ratio,
             first.index or second.index,
         )
 
     @property
     def agrees(self) -> bool:
-        return self.share_of_bound <= 1.0
+        return self.bound_ratio <= 1.0
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:

@@ -214,12 +214,12 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
         raise OracleError(
             "the robot made from a pinocchio.Model differs from the model",
             where=f"{tree.name}, {names[found.index[1]]}",
-            found=f"{found.share_of_bound:.3g} times the bound of rounding, Pinocchio {version()}",
+            found=f"{found.bound_ratio:.3g} times the bound of rounding, Pinocchio {version()}",
             remedy="please report this as an error of urdfkin, with the model",
         )
     return (
         f"compared with the model itself: {len(names)} links agree in {len(q)} configurations"
-        f" ({found.share_of_bound:.1%} of the bound)"
+        f" ({found.bound_ratio:.1%} of the bound)"
     )
 
 

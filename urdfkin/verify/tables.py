@@ -70,7 +70,7 @@ class TableCheck:
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
             quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
-        shares_of_bound: Ratio of the difference to its bound, for the same three quantities. A ratio above 1
+        bound_ratios: Ratio of the difference to its bound, for the same three quantities. A ratio above 1
             is a disagreement, unless `loss` explains the difference.
         has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
         loss: Explanation of a difference above the bound, if very large lengths in the table cause the
@@ -81,13 +81,13 @@ class TableCheck:
     metres: float
     radians: float
     units: dict[str, float]
-    shares_of_bound: dict[str, float]
+    bound_ratios: dict[str, float]
     has_snapping: bool
     loss: str | None = None
 
     @property
     def is_within_bounds(self) -> bool:
-        return all(share <= 1.0 for share in self.shares_of_bound.values())
+        return all(share <= 1.0 for share in self.bound_ratios.values())
 
     @property
     def agrees(self) -> bool:
@@ -100,7 +100,7 @@ class TableCheck:
                 f" {self.samples} samples: {self.loss}"
             )
         bound = "rounding and snapping" if self.has_snapping else "rounding"
-        figures = self.shares_of_bound if self.has_snapping else self.units
+        figures = self.bound_ratios if self.has_snapping else self.units
         unit, form = ("of the bound", ".0%") if self.has_snapping else ("in eps*scale", ".2g")
         worst = ", ".join(f"{name} {value:{form}}" for name, value in figures.items())
         verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"

@@ -199,7 +199,7 @@ class Verifier:
         total, worst = BatchComparison(), None
         for part in split_into_parts(policy, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
-            if failure is not None and (worst is None or comparison.share_of_bound > total.share_of_bound):
+            if failure is not None and (worst is None or comparison.bound_ratio > total.bound_ratio):
                 worst = failure
             total += comparison
         if worst is not None:

@@ -98,8 +98,8 @@ def format_decimal(x: Number, negligible: float) -> str | None:
     times `negligible`.
 
     >>> with precision(50):
-    ...     decimal(exact(1) / 3, 1e-15), decimal(as_interval(2), 1e-15), format_decimal(arb(0.0, 1e-40),
-    1e-15) ('0.33333333333333333', '2', '0')
+    ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
+    ['0.33333333333333333', '2', '0']
     """
     if isinstance(x, int):
         return str(x)
