@@ -32,7 +32,7 @@ def find_similar_names(
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
-    >>> nearest("UR5", ["ur5", "panda"])
+    >>> find_similar_names("UR5", ["ur5", "panda"])
     ['ur5']
     """
     prefix = word[:_MAX_COMPARED_CHARACTERS].lower()

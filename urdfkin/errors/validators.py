@@ -61,7 +61,7 @@ def as_choice(value: str | None, default: str, name: str) -> str:
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return `value` as a tuple; the caller must check that the robot has the names."""
+    """Return a list of names as a tuple; the caller must check that each name exists."""
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"

@@ -49,7 +49,8 @@ from urdfkin.model.tree import (
 #: Samples are at most this far from zero (rad or m). This number also replaces a missing limit.
 #: The range of a continuous joint is -pi to pi.
 #: All bounds assume this largest distance (m) from zero for a joint without limits that translates.
-#: Few linear axes of robots are longer. A bound for a travel of 10 m also holds for a shorter travel.
+#: Few linear axes of robots are longer than 10 m.
+#: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
 #: The condition of a bound, as text, if a joint that translates has no limits.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
@@ -271,7 +272,7 @@ def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
 def _hints_by_length(tree: KinematicTree, symbol: str) -> dict[int, Hint]:
     """Return hints for wrong lengths of q, v or a that users often pass.
 
-    These are the lengths of Pinocchio's vectors, and the length of a vector that includes the mimic joints.
+    Users often pass a vector of Pinocchio, or a vector that also contains the values of the mimic joints.
     """
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
@@ -310,8 +311,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    In `ready`, a joint without a value in the tree is at 0. If the joint's range excludes 0, the joint is in
-    the middle of the range.
+    The tree's pose `ready` may contain values for some joints only. Each other joint is then at 0, or in the
+    middle of its range if the range excludes 0.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -495,7 +496,8 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Maximum number of configurations that are checked for degrees; a whole batch has the same unit.
+#: Maximum number of configurations that urdfkin checks for degrees.
+#: All configurations of a batch have the same unit, so urdfkin checks only some of them.
 _MAX_CHECKED = 16
 
 

@@ -28,7 +28,7 @@ from urdfkin.errors.numbers import number_remedy, parse_float, parse_quantity
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, as_floats
 
-#: Types that q, v and a may have. Text is included, because `ArrayLike` contains `str`.
+#: Types that q, v and a may have. `ArrayLike` contains `str`, so q, v and a may also be text.
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
@@ -86,9 +86,9 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the named pose (n,) or None.
+        """Return a dict from each name in a text or mapping to its value, and a pose (n,) or None.
 
-        A text such as `ready, elbow=pi/2` begins with the name of a pose.
+        A text such as `ready, elbow=pi/2` begins with the name of the pose.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)

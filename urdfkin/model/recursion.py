@@ -1,7 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-The kind of number depends on the attribute `Recursion.eq`. This attribute contains the textbook's equations;
-`urdfkin.kinematics.arithmetic.bind_equations` makes them for a kind of number.
+The attribute `Recursion.eq` contains the textbook's equations for one kind of number, such as NumPy arrays.
+The function `urdfkin.kinematics.arithmetic.bind_equations` makes these equations.
 """
 
 from __future__ import annotations
@@ -197,8 +197,9 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
-        Each tuple contains the indices of the column and the coordinate in v, a factor, and the derivative
-        without this factor.
+        Each tuple is (i, j, factor, derivative). The column has the index i in v, and the coordinate has the
+        index j. The derivative must be multiplied by `factor`, the product of the two joints' mimic
+        multipliers.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]

@@ -244,7 +244,8 @@ class KinematicTree:
         joints: All joints, including fixed joints; a joint's parent link always precedes its child link.
         poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
 
-    A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError.
+    A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError. An unknown
+    mimicked joint raises UnknownNameError.
     """
 
     name: str

@@ -13,8 +13,8 @@ convention and change some of its joints:
     zero = 12.5                       # the program's value where the URDF's joint is at 0, in its unit
     unit = 4096                       # units of one turn; or "rad", "deg", "turn", "m", "mm"
 
-The joint value in the target program is `sign * value * factor + zero`, where `value` is the URDF's joint
-value in rad or m.
+The joint value in the target program is `sign * factor * value + zero`. The number `value` is the joint value
+of the URDF in rad or m, and `factor` converts rad or m to `unit`.
 """
 
 from __future__ import annotations
@@ -61,9 +61,11 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 class JointRule:
     """The rule that converts a joint's value to another program's value: `factor * value + zero`.
 
+    The property `factor` includes the sign.
+
     Attributes:
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
-            unit.
+            unit; `factor` is then None.
     """
 
     name: str | None = None
@@ -153,7 +155,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def parse_convention(text: str, where: str, name: str) -> Convention:
-    """Parse the TOML text of a convention; `name` replaces a missing name."""
+    """Parse the TOML text of a convention; `name` is the convention's name if the text contains none."""
     try:
         entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -263,7 +265,7 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: The last base-62 digit of an encoded number is less than this value. No other digit is less than the value.
+#: The last base-62 digit of an encoded number is less than 31. All digits before the last are at least 31.
 _THRESHOLD = 31
 
 
@@ -306,8 +308,8 @@ def make_identifier(name: str) -> str:
 def transcode(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    The result begins with "tn__" and the allowed characters of the name. If there are allowed characters, "_"
-    follows. Each other character then adds a number in base 62. These characters are sorted by code point.
+    The result consists of "tn__", the name's allowed characters, and "_" if the name has allowed characters.
+    One number in base 62 for each other character follows. The numbers are in the order of the code points.
 
     As in Punycode, the number is d n + p. The difference d is the character's code point minus the code point
     of the previous character. p is the character's position among the characters that are already encoded. n

@@ -49,7 +49,7 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint whose velocity has other axes or another point in the target program.
+    """A planar or floating joint; the target program uses other axes or another point for its velocity.
 
     `q` and `v` are the indices of the joint's first numbers in urdfkin's vectors, and `rows` are the joint's
     indices in the target program's v. The linear velocity is that of `point` (3,), in the joint's frame.
@@ -146,9 +146,9 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _determines_coordinate(self, i: int) -> bool:
-        """Return whether a joint's value determines a coordinate.
+        """Return False only for a mimic joint with multiplier 0.
 
-        The value of a mimic joint with multiplier 0 does not determine the mimicked joint's coordinate.
+        The value of such a joint does not determine the mimicked joint's coordinate.
         """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
@@ -161,7 +161,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The file does not contain a root joint that urdfkin added; the place -1 puts this joint first.
+        # The URDF text does not contain a root joint that urdfkin added. The rank -1 puts this joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -410,7 +410,7 @@ class Conversion:
         """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's; inverse of `to`.
 
         A wrong length, a number that is not finite, or a mimic joint's value that differs from its mimic rule
-        raises InputError.
+        raises InputError. A (cos, sin) pair whose norm is not 1 within 1e-6 also raises InputError.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -492,7 +492,7 @@ class Conversion:
         return q
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M x, or M x + M' v if v is given, with the matrix M of the module docstring."""
+        """Return M x or, if v is given, M x + (dM/dt) v, with M = `matrix(q)`."""
         if self._same_v:
             return x
         rates: FloatArray = x[..., self._v_index]
@@ -560,8 +560,8 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
-        Several numbers of v_tool may depend on the same number of v. Then M^-1 uses one number of v_tool, and
-        the columns of the other numbers are 0.
+        Several numbers of v_tool may depend on the same number of v. M^-1 then computes the number of v from
+        one of these numbers. The columns of the others are 0.
         """
         if not self._blocks:
             M_inverse = np.zeros((self.tree.nv, self.nv))
@@ -680,8 +680,8 @@ class Conversion:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
         `inputs` is q, or q and v, or q, v and a, in urdfkin's convention. The method calls `jacobian`
-        only to convert a Hessian or the time derivative of a Jacobian. A placement is returned unchanged, and
-        an undefined conversion raises InputError.
+        only to convert a Hessian or the time derivative of a Jacobian. A pose ("placement") is returned
+        unchanged. A quantity that no convention defines raises InputError.
         """
         if quantity == "placement":
             return result
@@ -776,10 +776,10 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each entry of urdfkin's q or v, return the index of a number of the target program.
+    """For each entry of urdfkin's q or v, return the index of the number that determines the entry.
 
-    The entry is computed from this number. A number of a mimic joint is used only if there is no
-    other number.
+    The index counts the numbers of the target program's q or v. A mimic joint's number is chosen only if no
+    other number determines the entry.
     """
     return [
         min(
@@ -807,5 +807,5 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Insert an axis into M (..., k, l) if a Jacobian with `ndim` axes has an axis for several frames."""
+    """Return M (..., 1, k, l) if a Jacobian with `ndim` array axes contains several frames, else M."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

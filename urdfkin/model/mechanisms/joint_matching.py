@@ -1,6 +1,7 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
+Joints at two matched bodies are paired by the names that the user gives or by equal names. Otherwise, joints
+are paired by equal labels of the links after the joints, or by geometry.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
@@ -74,9 +75,9 @@ class JointMatcher:
     ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
-        `via` contains the joints before these bodies. G (4, 4) moves A's body from its zero configuration to
-        the current pose of B's body. XC (4, 4) moves B's body from its zero configuration to its current
-        pose.
+        The matcher reached the two bodies through the joints `via`. G (4, 4) moves A's body from its zero
+        configuration to the current pose of B's body. XC (4, 4) moves B's body from its zero configuration to
+        its current pose.
         """
         named, left_a, left_b = self.pair_by_name(bodies, via)
         pairs = list(named)
@@ -293,7 +294,8 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield the pairs of joint axes at two bodies.
 
-    If the axis of A is parallel to its `reference` line, the pairs at the bodies after the two joints follow.
+    If A's axis in a pair is parallel to A's `reference` line, the function then also yields the pairs at the
+    bodies after these two joints.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -312,7 +314,8 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If no joint follows, other axes of the same body determine the pose, as for a drone's rotors.
+        # If no joint follows an axis, the axes of other branches determine the pose of B's root.
+        # For example, this is so for a drone's rotors.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -385,8 +388,9 @@ def _first_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """Return the first pair of revolute axes of each pair of branches of A and B.
 
-    Each item contains this pair, the pairs of prismatic axes before it, and the pairs of axes after it. If
-    two branches have only pairs of prismatic axes, the last of these pairs replaces the revolute pair.
+    Each item contains the first revolute pair, the prismatic pairs before this pair, and the pairs after this
+    pair. If two branches have only prismatic pairs, the last prismatic pair takes the place of the first
+    revolute pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):

@@ -57,8 +57,9 @@ MOST_DEPTH = 200
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: The score with more agreeing links and axes is better.
-#: If the numbers are equal, a score is better if its difference is less than this factor times the other's.
+#: Of two scores, the score with more agreeing links and axes is better.
+#: If both numbers are equal, compare the largest differences (m) of the two scores: the better score's
+#: difference must be less than this factor times the other score's difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -69,7 +70,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """Number of joint pairs beyond the current joint that may still be compared.
+    """Number of joint pairs beyond the current joint that the matcher may still compare.
 
     Several matchers can share this number.
     """
@@ -79,7 +80,7 @@ class LookAhead:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPair:
-    """A body of A, the corresponding body of B, and the joints `via` before these bodies.
+    """A body of A and the corresponding body of B; the matcher reached them through the joints `via`.
 
     Attributes:
         G: (4, 4) motion of A's body from its zero configuration to the current pose of B's body.
@@ -173,9 +174,9 @@ class MechanismMatcher:
     def _most_matches(self, base: tuple[int, int]) -> int:
         """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
-        In two matched branches, the number of joint pairs is at most the smaller number of joints. The same
-        holds for links. The sum over all branches is largest if the branches are matched in the order of
-        their sizes.
+        Two matched branches have at most as many joint pairs as the smaller branch has joints. The same holds
+        for links. The sum over all branches is largest if the branches are matched in the order of their
+        sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -626,10 +627,10 @@ def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> li
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad), and 0.0.
+    """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad), and 0 m.
 
-    The angle does not depend on the signs of the normals or the distance between the planes. The last value
-    is the shift (m), which is always 0 for planes.
+    The last value is the shift, which is always 0 for planes. The angle does not depend on the signs of the
+    normals or the distance between the planes.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -703,7 +704,7 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
-    # A joint that only one model has is a difference, whichever pairs are exchanged.
+    # If a joint exists in one model only, no exchange of pairs makes the two models agree.
     if best.only_a or best.only_b:
         return best
     tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)

@@ -21,9 +21,9 @@ plane over.
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
 the value t moves the bodies after it by exp(S t). The matched joint of B moves the corresponding bodies by
 exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If G also moves
-A's joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and the
-bodies after the joint differ, a constant rigid motion L describes the change of G. If only the axis differs,
-S' differs from S. The link poses of A and B are then
+A's joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and
+all later bodies of B are displaced together, G changes at the joint by a constant rigid motion L. If only the
+axis is displaced, S' differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
@@ -293,7 +293,7 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joints are consecutive, and the order `names` gives the same motion."""
+        """Return whether the joints `names` are consecutive and give the same motion in the order `names`."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         consecutive = all(self._are_consecutive(inner, outer) for inner, outer in pairwise(run))
@@ -435,7 +435,8 @@ class MatchedJoints:
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
-            differ; else "".
+            differ; else "". A planar or floating joint that is reversed in one model also has "kind" if
+            `AlignmentChoices` are given without a conversion for this joint.
         conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
             equal.
     """
@@ -661,8 +662,9 @@ class MatchedValues:
     b: LinearFunction
     #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
     b_unconverted: LinearFunction
-    #: Difference (rad or m) of the constants of A and B, minus the rounding error of one joint; at least 0.
-    #: The value is 0 if the functions of A and B differ by more than rounding.
+    #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
+    #: This value (rad or m) is then the difference of the two constants before this step, minus the rounding
+    #: error of one joint, but at least 0. Otherwise, the value is 0.
     rounding: float = 0.0
 
     @property
@@ -682,7 +684,7 @@ class Variables:
             different kinds.
         ranges: Range of each variable, rad or m; infinite without a limit.
         rules: Indices of the joint pairs with different mimic rules; one joint of a pair may be independent.
-        leaders: Each coordinate of B as a linear function of a variable, by the joint's name in B.
+        coordinates: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -779,10 +781,10 @@ class _VariablesBuilder:
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.
 
-        The constants depend on zero offsets, which urdfkin computes from poses. The rounding error of a pose
-        is the sum of the errors of all joints on the path. The tolerance for the constants is this sum for
-        the longest path. The slopes do not depend on zero offsets, so the tolerance for the slopes is the
-        rounding error of one joint.
+        The functions' constants depend on zero offsets, which urdfkin computes from poses. The rounding error
+        of a pose is the sum of the errors of all joints on the path. The tolerance for the constants is the
+        sum of the errors of the joints on the longest path. The slopes do not depend on zero offsets, so the
+        tolerance for the slopes is the rounding error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)

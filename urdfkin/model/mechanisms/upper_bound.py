@@ -14,18 +14,17 @@ is at one of its corners. At each joint, the interpolation increases the bound. 
 proportional to the square of the distance between grid points.
 
 **Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
-position of A's frame. Joint i moves by e(S t) in A and by e(S' t') in B, and L is a constant rigid motion
-before B's joint. These motions change d to
+position of A's frame. Let e(S t) be the motion of joint i in A, and e(S' t') its motion in B. Let L be a
+constant rigid motion before B's joint. These motions change d to
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
 If joint i is the same in A and B, the first three terms are 0. For each direction u, the maximum of u . d' is
 at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
-and d. If A and B differ at one joint only, the bound exceeds the true maximum only because of the
-interpolation. If A and B differ at several joints, the terms of these joints may be largest in different
+and d. If A and B differ at several joints, the terms of these joints may be largest in different
 configurations. The sum of the maxima then exceeds the true maximum. If A and B differ only in constant
-motions L, urdfkin also computes a second bound without interpolation. The second bound is the sum of the
-distances by which each L can move the frame.
+motions L, urdfkin also computes a second bound, and uses the smaller bound. The second bound is the sum of
+the distances by which each L can move the frame.
 
 **Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
 derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
@@ -573,9 +572,9 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
-    Most joints before the first difference of the models only rotate D. But such a joint also changes the
-    length of D if its variable moves a later joint of the result. The result begins with the first joint of
-    this kind. If there is none, the result begins with the first joint that differs.
+    A joint before the first difference of the models usually only rotates D. If the joint's variable also
+    moves a later joint of the result, the joint changes the length of D. The result begins with the first
+    such joint. If there is none, the result begins with the first joint that differs.
     """
     steps, pairs = (
         alignment.path(frame.previous),
