@@ -90,7 +90,7 @@ class CompiledTree:
             joint, in the order of `frames`.
         columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
-        leaders: (frames, columns) index of the sum column of each Jacobian column; -1 if the column's joint
+        sum_columns: (frames, columns) index of the sum column of each Jacobian column; -1 if the column's joint
             does not move the frame. The columns of a joint and of its mimic joints are added in one sum
             column. The sum column is the first of these columns on the path to the frame.
         q_indices: Indices of the coordinates that the recursion needs.
