@@ -64,7 +64,8 @@ _MOTION = {
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
-#: Motions of each kind of joint: the index of the axis in the joint's frame, and True for a rotation.
+#: Motions of each kind of joint. The integer of a motion is the index of its axis in the joint's frame.
+#: The other entry of a motion is True for a rotation, and False for a translation.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -90,9 +91,9 @@ class CompiledTree:
             joint, in the order of `frames`.
         columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
-        sum_columns: (frames, columns) index of the sum column of each Jacobian column; -1 if the column's joint
-            does not move the frame. The columns of a joint and of its mimic joints are added in one sum
-            column. The sum column is the first of these columns on the path to the frame.
+        sum_columns: (frames, columns) index of the column to which each Jacobian column is added; -1 if the
+            column's joint does not move the frame. The columns of a joint and of its mimic joints are added
+            to the first of these columns on the path to the frame.
         q_indices: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints. The first
@@ -187,7 +188,10 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the number of joints from the root to each link on the paths to `links`."""
+    """Return the depth of each link that lies on a path from the root to one of `links`.
+
+    The depth of a link is the number of joints between the root and the link.
+    """
     visited = {0}
     for end in links:
         link = end
@@ -308,8 +312,8 @@ class ProgramHeader(IntEnum):
     """Indices of the integers at the beginning of a program, before the instructions.
 
     CODE is the index of the first instruction. BLOCKS_Q, BLOCKS_V and BLOCKS_END delimit the lists of blocks
-    of eight coordinates or velocities. ANGLES and ANGLES_END delimit the list of joint angles. Q, V, A and
-    BASE are the first scratch rows of the inputs.
+    of eight coordinates or velocities. ANGLES and ANGLES_END delimit the list of joint angles. The inputs q,
+    v, a and the base's state begin at the scratch rows Q, V, A and BASE.
     """
 
     CODE = 0
@@ -335,7 +339,8 @@ INSTRUCTION_WIDTH = 5
 #: Number of integers that describe a joint angle in a program: the scratch row of the angle, the scratch row
 #: of the sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
-#: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
+#: Rows of scratch memory. Row 0 contains the number 0, and row 1 contains the number 1.
+#: Rows 2 to 17 contain the results of a frame, row 18 a joint angle, and later rows all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Number of integers for one Jacobian column in a Hessian. The integers are the scratch row of the column,
@@ -459,7 +464,7 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state after a joint if an event later than event `following` begins with this state."""
+        """Save the state after joint `step` if an event later than event `following` needs this state."""
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
 
@@ -571,7 +576,7 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight that contains one of the given indices."""
+    """Return the first index of each block of eight consecutive indices that contains one of `indices`."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 

@@ -1,8 +1,8 @@
 """Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
-For a few configurations, Python is faster than loading or compiling a kernel. This module therefore measures
-how long Python has computed without each kernel. The time in the table also includes an estimate for the next
-computations.
+For a few configurations, Python is faster than loading or compiling a kernel. For each kernel, this module
+therefore adds up the seconds that Python computed without the kernel. The time in the table also includes an
+estimate for the next computations.
 
 | time without a kernel | action |
 |---|---|
@@ -30,7 +30,7 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: Computing times (s) without a kernel; the table above lists the action that follows each time.
+#: Computing times (s) without a kernel. The table in the module's docstring says what follows each time.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: This threshold (s) applies instead of `LOAD_AFTER` after the first kernel is loaded.
 _LOAD_NEXT_AFTER = 0.03
@@ -96,7 +96,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single(name: str) -> bool:
     """Return whether to load the function that computes one configuration with the kernel `name`.
 
-    If the kernel is loaded, each call adds `_SECONDS_SAVED` seconds to the time lost without this function.
+    If the kernel is loaded and `use_only` is not active, each call of `should_load_single` counts as
+    `_SECONDS_SAVED` seconds that were lost without the function.
     """
     if _modes:
         return _modes[-1] == "compiled"

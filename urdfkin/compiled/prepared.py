@@ -93,7 +93,7 @@ class PreparedFrame:
         self._robot, self._plan = robot, plan
         #: Whether `Robot.prepare` created this object. If so, the first call loads or compiles machine code.
         self.always_load = False
-        # When `_compute_first` creates a quantity's function, it replaces the attribute by the function.
+        # `_compute_first` creates the function of a quantity and assigns this function to the attribute.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")

@@ -233,7 +233,7 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`; the function of this name in compiled code returns a pointer."""
+    """Return the list `address`. In compiled code, the function with this name returns a pointer."""
     return address
 
 

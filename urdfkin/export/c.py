@@ -137,7 +137,10 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def count_reserved(code: FrameCode, function: Function) -> int:
-    """Return the least number of configurations whose arrays, if not empty, have eight or more numbers."""
+    """Return the least number of configurations for which every array has at least eight numbers.
+
+    Arrays without numbers do not count.
+    """
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 

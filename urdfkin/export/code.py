@@ -104,7 +104,10 @@ def make_verified_code(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Return the code of a frame, compared with Pinocchio, with test vectors."""
+    """Return a frame's code with test vectors; the code's results were compared with Pinocchio's results.
+
+    There is no comparison if verification is switched off.
+    """
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
     rows = _parse_quantities(quantities)

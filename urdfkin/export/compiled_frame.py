@@ -141,8 +141,8 @@ def _load_code(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path, but a later library can get the same descriptor.
-        # Therefore each path contains a different number of "./".
+        # The loader identifies a library by its path, and a later library can get the same descriptor.
+        # A different number of "./" for each library makes all paths different.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -432,7 +432,7 @@ class CompiledFrame:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
             # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
-            # Therefore the buffer `stage` has extra space.
+            # The buffer `stage` has space for these additional numbers.
             stage = (
                 aligned_empty(LANES * part[0].size + LANES) if row.has_columns and uses_buffer(out) else None
             )

@@ -167,8 +167,9 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 class ExactProof(Proof):
     """The checks of an exported file with exact constants.
 
-    The code contains multiples of pi instead of `angle_count` different angles. `max_angle_change` is the
-    largest difference (rad) between an angle and the multiple of pi that replaces it.
+    `angle_count` is the number of different angles that multiples of pi replace in the code.
+    `max_angle_change` is the largest difference (rad) between an angle and the multiple of pi that replaces
+    it.
     """
 
     angle_count: int = 0

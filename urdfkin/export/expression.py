@@ -34,7 +34,8 @@ class Node:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
         operands: The operands, which are nodes and constants; for an input such as q[3], the index 3.
         index: Number of the expression in the order of creation; operands have smaller numbers.
-        step: Index of the joint on the path at which the recursion created this expression.
+        step: Index of the recursion's step that created this expression. The first steps are the joints of
+            the path; the last steps are the final frame and the results.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -78,7 +79,7 @@ class Node:
 class Graph:
     """The expressions of one function; each node stores the number of the equation that created it."""
 
-    #: Constant that replaces products with 0 and differences such as x - x.
+    #: The number 0. Each product with 0 and each difference x - x becomes this constant.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -137,9 +138,9 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return an equation that stores its number in the nodes that it creates.
+        """Return a copy of an equation that stores the equation's number in each node that a call creates.
 
-        If another equation calls this equation, the nodes store the number of the calling equation.
+        If one equation calls another equation, the nodes store the number of the calling equation.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:

@@ -60,7 +60,8 @@ def make_chain_code(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # The user did not write this URDF.
+        # The URDF of a chain is generated, so warnings about this URDF are useless to the user.
+        warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
@@ -79,7 +80,7 @@ def make_chain_code(
 
 
 def _replace_unsafe_names(table: DHTable) -> DHTable:
-    """Replace each name of a joint or frame that is not allowed in a URDF."""
+    """Replace each joint name and each frame name that a URDF does not allow."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -7,9 +7,10 @@ larger expressions.
 
 `single_bounds` bounds the rounding errors of a function in single precision. Each operation and each constant
 of the code has a rounding error, which `urdfkin.kinematics.roundings` derives. To first order in eps, the
-error of a result is a sum of products. Each product is a rounding error, times the derivative of the result
-with respect to the operation or constant. The bound is the sum of the absolute values of these products. One
-backward pass over the operations computes the derivatives of all results.
+error of a result is a sum of products. One factor of a product is the rounding error of an operation or a
+constant. The other factor is the derivative of the result with respect to the operation or constant. The
+bound is the sum of the absolute values of these products. One backward pass over the operations computes the
+derivatives of all results.
 """
 
 from __future__ import annotations
@@ -164,7 +165,7 @@ def make_function(
 ) -> Function:
     """Return the function that computes a quantity for the only frame of `plan`.
 
-    Exact constants of `plan` can be expressions; then `graph` is the graph that contains these expressions.
+    If constants of `plan` are expressions, `graph` must be the graph that contains these expressions.
     """
     graph = graph or Graph()
 

@@ -157,7 +157,7 @@ def compare_with_pinocchio(
 
     Raise VerificationError if a difference exceeds the error bound.
     """
-    checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
+    checker = copy(verifier)  # The user's certificate does not count the checks of a copy.
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (samples.q, samples.v, samples.a)[: len(function.inputs)]

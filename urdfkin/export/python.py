@@ -26,8 +26,8 @@ class Dialect:
 
     Attributes:
         result: Function that yields the lines of code that return the results.
-        imports: Import lines. `{}` is replaced by the used functions among `cos`, `sin` and `sqrt`. If none
-            of them is used, the line is left out.
+        imports: Import lines. The names of the functions that the code uses replace `{}`. Possible names are
+            `cos`, `sin` and `sqrt`. A line with `{}` is left out if the code uses none of these functions.
         values: Body of the exported function `_values`, which evaluates a function for some configurations.
         index: Pattern for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported function `check`, with its default; "" for none.
@@ -53,7 +53,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Make `Dialect.result` for code that assigns each number to an element of an array."""
+    """Return a function for `Dialect.result`; its code assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -66,7 +66,10 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Make `Dialect.result` for code that returns a matrix. A Hessian becomes a matrix (6 nv, nv)."""
+    """Return a function for `Dialect.result`; its code returns a matrix.
+
+    A Hessian becomes a matrix (6 nv, nv).
+    """
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -111,7 +114,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Make `Dialect.first_lines` for code that checks the input lengths of one configuration."""
+    """Return a function for `Dialect.first_lines`; its code checks the input lengths of one configuration."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -129,7 +132,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make `Dialect.result` for code that stacks the numbers, because the arrays are immutable."""
+    """Return a function for `Dialect.result`; its code stacks numbers, because arrays are immutable."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -241,10 +244,11 @@ def _torch_module(code: FrameCode) -> str:
 
 
 def _rotation_bound(plan: CompiledTree) -> float:
-    """Return an upper bound on the rotation (rad) of any vector when a coordinate changes by 1 rad.
+    """Return a bound on the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
 
-    Several revolute joints can depend on the same coordinate. For each coordinate, the absolute values of
-    the multipliers of these joints are added. The bound is the largest sum, and at least 1.
+    Several revolute joints can depend on the same coordinate by mimic rules. For each coordinate, the
+    function adds the absolute values of these joints' multipliers. The bound is the largest sum, and at
+    least 1.
 
     With a floating joint, the bound is at least 3. If one component of a unit quaternion changes by t, the
     body rotates about a fixed axis. The quaternion and the axis of the changed component are vectors with

@@ -187,8 +187,8 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
         case Reference.LOCAL_WORLD_ALIGNED:
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
-        case Reference.LOCAL | Reference.WORLD:  # The vectors are already in these axes.
-            pass
+        case Reference.LOCAL | Reference.WORLD:
+            pass  # The components of both vectors already refer to the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

@@ -1,7 +1,7 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, each written once for every kind of number.
 
-A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing: it
-uses the arithmetic of the numbers it is called with. If vectors have another type,
+A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
+because the equations use the arithmetic of their arguments. If vectors have another type,
 `urdfkin.kinematics.number_kinds` replaces the basic operations of the section "vectors". The same equations
 run on batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and
 LaTeX expressions.
@@ -9,9 +9,9 @@ LaTeX expressions.
 All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
 own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
 
-The textbook and a URDF number the frames differently. In the textbook d_{i-1,i} belongs to link i and follows
-the joint. The frame of a URDF joint lies on the joint's own axis, so d belongs to link i-1 and precedes the
-joint. Both numberings give the same sums.
+The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
+and follows the joint. In a URDF, the frame of a joint lies on the joint's own axis. There, the offset belongs
+to link i-1 and precedes the joint. Both numberings give the same sums.
 """
 
 # -- vectors ------------------------------------------------------------------------------------------

@@ -17,19 +17,20 @@ rotated vector grows for each joint by
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The last row is computed for the whole joint; it is not the sum of the first three rows. A count of the last
-row may be smaller than the sum, because the worst cases of the three rows do not occur together. A count may
-also be larger than the sum, because a rotation adds the errors of several components. The errors of urdfkin
+The last row is computed for the whole joint; it is not the sum of the first three rows. urdfkin's last count
+is smaller than the sum, because the worst cases of the three rows do not occur together. Pinocchio's last
+count is larger than the sum, because a rotation adds the errors of several components. The errors of urdfkin
 and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
 `tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers that
 record each of their roundings.
 
 The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
-factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
-errors too. In each implementation, the sum of these errors is at most 2 eps for each term, which has two or
-three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count includes one more
-joint than the path has. This joint covers the frame's own offset and the first sum. Second,
-`PINOCCHIO_ROUNDINGS` is 24 instead of 22.5. The difference of 1.5 covers the other sums.
+factors of this term. The addition of the terms and the cross products in a term have rounding errors too. In
+each implementation, the sum of these errors is at most 2 eps for each term. A term has two or three factors
+(`urdfkin.verify.bounds`). Two margins cover these errors. First, the tolerance is computed for one more joint
+than the path has. The margin of this joint covers the errors of the frame's own offset and of the first sum.
+Second, `PINOCCHIO_ROUNDINGS` is 24 instead of 22.5. The difference of 1.5 covers the errors of the other
+sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -49,9 +50,9 @@ this standard deviation.
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
 2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t counts as
-2 t / eps additional rounding errors of each factor, for all frames after the joint. If a tilt is larger than
-eps, urdfkin reports the finding URDF514.
+at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t adds
+2 t / eps rounding errors to each factor of a term. This addition applies to all frames after the joint. If a
+tilt is larger than eps, urdfkin reports the finding URDF514.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
 small constants. An entry of a constant rotation matrix is small if it is less than half an eps of the largest
@@ -79,7 +80,7 @@ The counts of an export's joint are
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
 offset's length. In a matrix row and in a cross product, an export also omits each product that contains an
-omitted component. These products would have a rounding error of 1.5, so the omission causes a smaller error.
+omitted component. The error of this omission is smaller than 1.5, the rounding error of these products.
 Without fused multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint,
 plus the errors of the sums over the joints. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these sums. The
 standard deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the
@@ -87,8 +88,8 @@ error is at most 7.2 eps, which is within `PINOCCHIO_ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
 2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.function`
-multiplies each of these errors by the derivative of the result with respect to the value. The bound is the
-sum of the absolute values of all these products. The error of one operation is
+multiplies each error by the derivative of the result with respect to the operation or constant. The bound is
+the sum of the absolute values of all these products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -119,9 +120,10 @@ covers the sums over the joints. MuJoCo does not replace the file's axes by coor
 **A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
 doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
 to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
-same order. Both start with the rule that refers to the independent joint. The errors of sine and cosine are
-counted above. The functions sine and cosine first subtract multiples of pi/2 from the angle; this subtraction
-is exact for every angle, also for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
+same order. Both programs start with the rule that refers to the independent joint. The errors of sine and
+cosine are counted above. The functions sine and cosine first subtract multiples of pi/2 from the angle; this
+subtraction is exact for every angle, also for 1e12 rad. Therefore a mistake in a mimic joint's angle is
+always detected.
 
 **A base** (`urdfkin.BaseMotion`) gives the robot's root link a pose in the world. A base with a rotation M
 counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
@@ -159,9 +161,9 @@ of mimic rules between the mimic joint and the independent joint.
 **Numbers near zero.** A product below the smallest normal number loses bits. The error of such a product is
 at most 2^-1075. This number is half the smallest subnormal number, or (eps/2) times the smallest normal
 number. Therefore, every scale except 0 is at least the smallest normal number
-(`urdfkin.kinematics.number_kinds`). The tolerance `count * eps * scale` is then larger than the error
-2^-1075, even if the product is multiplied by large numbers later. The smallest unit is eps times the smallest
-normal number, 2^-1074.
+(`urdfkin.kinematics.number_kinds`). With this scale, the tolerance `count * eps * scale` is larger than the
+error 2^-1075. The tolerance is also large enough if the product is multiplied by large numbers later. The
+smallest unit is eps times the smallest normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has an error of at most 8:
 
@@ -195,9 +197,11 @@ LEAST_UNIT = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: Allowed difference (in eps) from Pinocchio, for each joint and each factor of a term such as w x (w x d).
+#: Allowed difference (in eps) from Pinocchio for one joint and one factor of a term.
+#: For example, the term w x (w x d) has three factors.
 PINOCCHIO_ROUNDINGS = 24.0
-#: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term such as w x (w x d).
+#: Allowed difference (in eps) from MuJoCo for one joint and one factor of a term.
+#: For example, the term w x (w x d) has three factors.
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0

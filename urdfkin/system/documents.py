@@ -146,7 +146,7 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the JSON path and a description of an entry that only `data` has."""
+    """Return the JSON path and a description of an entry of `data` that `document` lacks, or None."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"

@@ -152,7 +152,7 @@ def exists(path: Path) -> bool:
     try:
         return path.exists()
     except OSError:
-        # The error is reported when the path is read.
+        # The function that reads the path reports the error.
         return True
 
 

@@ -37,7 +37,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # If another thread registered the functions during the fork, `_before_fork` has not run.
+    # Another thread can register `_before_fork` during a fork. In this case, `_acquired` has no entry.
     for lock in reversed(_acquired.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -64,7 +64,7 @@ class ImportLock:
             return
         with self._lock:
             if not self._registered:
-                # The docstring of the class says why this import precedes the registration.
+                # `logging` must be imported before the registration; the class docstring says why.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

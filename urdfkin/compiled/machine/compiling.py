@@ -102,7 +102,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba uses a Python function as the key of a compiled function, and never calls this function.
+        # Numba needs a Python function as the key of the compiled code. The Python function is never called.
         descriptor, environment = state.cr.fndesc, state.cr.env
         handle = make_function(
             descriptor.lookup_module(), descriptor.qualname, "", 0, environment, (state.library,)

@@ -124,9 +124,9 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block of numbers in the matrix whose rows are the given vectors.
+    """Divide a matrix into square blocks, and transpose each block; `vectors` are the rows of the matrix.
 
-    The number of vectors is a power of two. Blocks of 2 by 2 numbers are transposed first. To transpose a
+    The number of rows is a power of two. Blocks of 2 by 2 numbers are transposed first. To transpose a
     larger block, the function exchanges the block's upper right quarter with the lower left quarter.
     """
     x, w = list(vectors), 1
@@ -241,7 +241,7 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @intrinsic
 def _prefetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the memory around `x[at]` into the cache; an address beyond the array is harmless."""
+    """Load the cache line of `x[at]` into the cache; an address beyond the array causes no error."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -262,7 +262,7 @@ def prefetch(x, at, count):
             _prefetch(x, number)
 
 
-#: Prefetch distance: number of doubles between the number that is read and the number that is prefetched.
+#: Prefetch distance in doubles: while `x[at]` is read, `x[at + _PREFETCH_DISTANCE]` is loaded into the cache.
 _PREFETCH_DISTANCE = 512
 
 

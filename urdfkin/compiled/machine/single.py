@@ -1,14 +1,13 @@
 """Compute one configuration with compiled functions that Python calls like built-in functions.
 
 In a call through Numba, checking the arguments takes as long as the recursion itself. CPython only passes the
-addresses of the arguments to a built-in function. The compiled function reads a few 8-byte
-words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds
-Python's global interpreter lock for about a microsecond. For unsupported arguments, the function returns
-None.
+addresses of the arguments to a built-in function. The compiled function reads a few 8-byte words of each
+array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
+interpreter lock for about a microsecond. For unsupported arguments, the function returns None.
 
-A call marks its scratch memory as busy. This is one atomic operation, so it is also safe in a Python without
-a global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
-caller then computes the result in another way.
+A call sets a flag while it uses its scratch memory. One atomic operation sets the flag, so the flag is also
+safe in a Python without a global interpreter lock. If another thread is using the scratch memory, the
+function also returns None. The caller then computes the result in another way.
 """
 
 from __future__ import annotations
@@ -48,7 +47,8 @@ _HEADER_WORDS = object.__basicsize__ // 8
 #: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
-#: The number of axes, and the flags, are in the lower four bytes of their words.
+#: The lower four bytes of the word `_NDIM` contain the number of axes.
+#: The lower four bytes of the word `_FLAGS` contain the flags.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS,
     _HEADER_WORDS + 1,

@@ -19,7 +19,8 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
-#: Numbers of the unknown equations: page 2 of the chapter is lost, and only 7.7 is repeated in section 7.2.
+#: Numbers of the equations that are unknown, because page 2 of the textbook's chapter is lost.
+#: Section 7.2 repeats the equation 7.7 of this page.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
