@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: A panel is a function that draws a motion against the time (s) in the given axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles, which make lines distinguishable without colours.
+#: The dashes of seven lines. The first six lines are distinguishable without colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
@@ -44,7 +44,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k; they differ for the first 49 lines."""
+    """Return the colour and the dashes of line k; the first 21 lines differ in colour or dashes."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
