@@ -11,9 +11,9 @@ joint's row. For skew axes, beta is 0, and the other six numbers are unique exce
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. `match_axis_transforms` copies these numbers from a reference table,
-except for one row. For this row, `match_axis_transforms` chooses the d or the theta that makes the sum
-correct. In a Hayati row, d can also be chosen freely, because the two axes do not determine d.
+angles theta about coinciding axes. `match_axis_transforms` copies d and theta from a reference table, except
+for one row. The d or the theta of this row is chosen so that the sum is correct for the path. In a Hayati
+row, d can also be chosen freely, because the two axes do not determine d.
 """
 
 from __future__ import annotations
@@ -205,9 +205,9 @@ class PairWithReference:
 
         The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
         Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
-        is the same as in the reference. If the tilt is small, this component is inaccurate; it is then
-        computed from a and from the perpendicular component of v. The result is None for parallel axes, or if
-        it would exceed `reach`.
+        is the same as in the reference. If the tilt is small, this component is inaccurate. The component is
+        then computed by Pythagoras from the length a and the perpendicular component of v. The result is None
+        for parallel axes, or if it would exceed `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_sine(self.A), math.hypot(along, across)
@@ -277,7 +277,7 @@ def _choose_offset(
 ) -> float:
     """Return the reference's d, or the d for which another cell of the table equals the reference.
 
-    The other cell is d of a later row, or a of a Hayati row.
+    The other cell is the cell d of a later row, or the cell a of a Hayati row.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -290,7 +290,8 @@ def _choose_offset(
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # If a row from i to end - 1 is a Hayati row, d is chosen so that a of this row equals the reference.
+        # If the rows i to end - 1 contain a Hayati row, d is chosen to give this row the
+        # reference's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -379,10 +380,11 @@ class PoseTolerance:
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the tolerance for rounding errors in the product of the origins of `joints` joints.
+    """Return the tolerance for rounding errors in a constant pose.
 
-    `length` is the sum of the offsets of these joints (m), and `reach` is the length of the whole path. The
-    tolerance covers angles that a program rounded to fifteen digits.
+    The constant pose is the product of the origin transforms of `joints` joints. `length` is the sum of the
+    offsets of these joints (m), and `reach` is the length of the whole path. The tolerance covers angles that
+    a program rounded to fifteen digits.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)

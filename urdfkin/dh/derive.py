@@ -144,7 +144,7 @@ def _make_table(
 
 
 def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Return the constant poses, with the z axes of the joints `flip` reversed."""
+    """Return the constant poses after the z axes of the joints in `flip` are reversed."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -289,7 +289,10 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta, and d if it is 0, from the first row of `like`; change the base to compensate."""
+    """Give the first row the theta of the first row of `like`, and change the base to compensate.
+
+    If d is 0 in `like`, d of the first row becomes 0 too.
+    """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE_ROUNDINGS * EPS or offset:
@@ -301,7 +304,11 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; change the tool to compensate."""
+    """Give the last row the theta, a and alpha of the last row of `like`; change the tool to compensate.
+
+    If d is 0 in `like`, d of the last row becomes 0 too. If neither table has a tool and the angles theta are
+    nearly equal, no cell changes, except that rounding errors are removed from theta.
+    """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
     if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_TOLERANCE:

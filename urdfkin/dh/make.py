@@ -22,7 +22,8 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: Tables with a larger difference of cells (rad, or relative to the reach) describe different robots.
+#: If the cells of two tables differ by more than this number, the tables describe different robots.
+#: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
 #: Two cells theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _ZERO_TOLERANCE = 1e-2

@@ -206,7 +206,7 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" with the constant pi; add the keys `kind` and `sense` to the row."""
+    """Replace a cell such as "q3 + pi" by its constant, which is pi; add the keys `kind` and `sense`."""
     texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
     cells = {name: _parse_cell_text(text, f"{where}, {name}") for name, text in texts.items()}
     variables = [name for name, cell in cells.items() if cell.factor is not None]

@@ -7,8 +7,8 @@ tolerance. Three kinds of angles are snapped:
 2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
-The positions of the joints' origins do not change. A changed angle therefore only rotates the rest of the
-chain about a joint's origin, and `SnapReport` bounds the displacement of the tip.
+Each changed angle only rotates the rest of the chain about the origin of one joint. `SnapReport` contains a
+bound of the tip's displacement.
 """
 
 from __future__ import annotations

@@ -66,8 +66,9 @@ class AxisPair:
 class StructureKind:
     """A geometric property of consecutive joints, for example "spherical wrist".
 
-    `radians` and `metres` are the deviation from the exact property. `at` is the intersection of the axes in
-    the base frame, in the zero configuration (metres).
+    `radians` and `metres` are the largest deviations from the exact property, for example of the axes from a
+    common intersection. `at` is the intersection of the axes in the base frame, in the zero configuration
+    (metres).
     """
 
     name: str
@@ -86,8 +87,9 @@ class Structure:
     """The geometric structure of a path.
 
     `reach` is an upper bound (m) of the tip's distance from the point `reach_from`, within the joint limits.
-    `reached` is the largest such distance in sampled configurations. `reach_from` is a point in the base
-    frame (m), and does not depend on the configuration. `reach_point` describes the point in words:
+    `sampled_reach` is the largest distance (m) from this point in sampled configurations. `reach_from` is a
+    point in the base frame (m), and does not depend on the configuration. `reach_point` describes the point
+    in words:
 
     - The first two joints are revolute, and their axes are not nearly parallel (more than 0.02 rad): the
       point of the first axis that is nearest to the second axis.

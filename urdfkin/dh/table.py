@@ -293,7 +293,10 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Sorted indices of the rows with changed angles; `SnapChange.row` explains the indices -1 and n."""
+        """Sorted indices of the rows with changed angles.
+
+        The index -1 means the base, and the index n means the tool of a table with n rows.
+        """
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:

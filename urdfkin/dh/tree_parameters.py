@@ -225,8 +225,8 @@ def _find_transforms(
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform is between the axis of the antecedent and the joint's axis. The angle and the offset are a
-    rotation about z and a shift along z. They change the axis frame of a link into the frame of its row.
+    The transform leads from the axis of the antecedent to the joint's axis. The angle is a rotation about z,
+    and the offset is a shift along z. This motion moves the axis frame of a link to the frame of its row.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 #: A panel is a function that draws a motion against the time (s) in the given axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles, which make lines distinguishable without colours.
+#: The dashes of seven lines. The first six lines are distinguishable without colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
@@ -44,7 +44,7 @@ def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str
 
 
 def _line_style(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k; they differ for the first 49 lines."""
+    """Return the colour and the dashes of line k; the first 21 lines differ in colour or dashes."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -79,7 +79,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # An axis that shows fewer than two powers of ten gets three ticks at other values.
+    # If fewer than two powers of ten are within the axis, three ticks at other values replace them.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -95,7 +95,8 @@ def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, 
 def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     """Draw the disagreement with Pinocchio, and its bound as a thin line, in units of eps * scale.
 
-    eps is 2**-52. The scale is an upper bound on the sum of the absolute values of the terms of a number.
+    eps is 2**-52. Each plotted number is computed as a sum of terms. The scale is an upper bound of the sum
+    of the absolute values of these terms.
     """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.unverified_reason is not None:

@@ -48,7 +48,8 @@ _CORRECTED_FRACTION = 0.5
 #: the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Differing cells without a fit are reported only if they outnumber those after a fit by at most this number.
+#: Suppose that n cells differ without a fit, and m cells differ after a fit. The n cells are reported only if
+#: n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: If the tip moves by less than this fraction of the path length, the reach is the path length.
 _FIXED_TIP_SPREAD = 1e-6

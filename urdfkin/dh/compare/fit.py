@@ -55,7 +55,7 @@ _LAST_WEIGHT = 1.2
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: Below this mean error, relative to the reach, joint offsets are not changed by large angles.
+#: The fit tries large changes of joint offsets only if the mean error exceeds this fraction of the reach.
 _ROUNDING = 1e-13
 #: Tip error, relative to the reach, below which no other joint signs are tried.
 _TIP_ROUNDING = 1e-12
@@ -63,7 +63,7 @@ _TIP_ROUNDING = 1e-12
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: Arguments `count` and `beam` of `find_sign_fits` in a fast fit.
+#: Arguments `count` and `beam_width` of `find_sign_fits` in a fast fit.
 FAST_SEARCH = (3, 16)
 
 
@@ -237,7 +237,8 @@ def _sparse_changes(
     """Return changes of the cells that remove the error.
 
     After these changes, as few cells as possible differ from `start`. If the free parameters can move the tip
-    in the same way as a cell, the cell does not change. An example is the joint offset of the cell's row.
+    in the same way as a cell, the cell does not change. For example, a fitted joint offset moves the tip in
+    the same way as the cell theta of a revolute joint.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)

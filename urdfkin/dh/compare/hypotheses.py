@@ -2,8 +2,9 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations by the difference of the shapes from the URDF's shape,
-and by the number of changes of the file's interpretation. It fits at most three interpretations.
+`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if its shape is closer
+to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation. The
+function fits at most three interpretations.
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each change of the file's interpretation costs this fraction of the smallest difference of shapes.
+#: Cost of each difference from the file's interpretation, as a fraction of the smallest difference of shapes.
+#: The tolerance is added to this cost.
 _DIFFERENCE_COST = 0.1
-#: A better interpretation has at most this fraction of the stated tip error, and of the reach, as tip error.
+#: The tip error of a better interpretation is at most this fraction of the tip error of the file's
+#: interpretation, and at most this fraction of the reach. A tip error within the tolerance always suffices.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)

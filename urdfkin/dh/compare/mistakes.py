@@ -32,7 +32,8 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _ANGLE_TOLERANCE = 1e-9
-#: If a table has more possible corrections, `MistakeSearch.find` does not fit joint offsets and joint signs.
+#: If a table has more possible corrections than this number, joint offsets and joint signs are not fitted to
+#: the corrected tables.
 _MAX_FITS = 100
 
 
@@ -60,8 +61,8 @@ class MistakeSearch:
 
         The smallest fit changes the fewest parameters. The result is empty if no correction makes the fit
         smaller. A table that `agrees` after a fit may be correct and differ from the URDF only in its frames.
-        A correction of such a table is reported only if the fit then changes at most the base or the tool,
-        but not both.
+        A correction of such a table is reported only if the corrected table needs no fit, or only a fit of
+        the base, or only a fit of the tool.
         """
         if self._without_fit(reference) is not None:
             return ()

@@ -23,7 +23,7 @@ Parts = list[str | Table | Matrix]
 #: Largest tip error (rad, or metres per metre of reach) that counts as zero after a correction of cells.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 NEGLIGIBLE_ERROR = 1e-9
-#: `fit_resolution` replaces a smaller tip error (rad, or metres per metre of reach) by this number.
+#: Lower limit of the tip error (rad, or metres per metre of reach) in `fit_resolution`.
 _MIN_TIP_ERROR = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_FACTOR = 1.0 + 1e-6
@@ -80,7 +80,11 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FitChanges:
-    """Parameters that a fit must change; `zeros` and `reversed` are numbers of joints."""
+    """The parameters that a fit must change.
+
+    `zeros` is the number of joints with a changed offset. `reversed` is the number of joints with a changed
+    sign.
+    """
 
     base: bool = False
     tool: bool = False
@@ -127,10 +131,12 @@ class TableComparison:
         metres, radians: Largest errors of the fitted table's tip on the samples.
         metres_bound, radians_bound: Proven upper bounds of the errors of the fitted table's tip for all
             angles, and for all displacements within limits. A prismatic joint without limits is assumed to be
-            10 m of zero. The bounds do not include rounding errors.
+            within 10 m of zero. The bounds do not include rounding errors.
         unfitted_metres, unfitted_radians: Largest errors of the unfitted table's tip on the samples.
         unfitted_differences: The cells that must change so that the table agrees without a fit. Empty if
-            these cells are too many, or if a tip error remains after their correction.
+            these cells outnumber the cells in `differences` by more than two, or if a tip error remains after
+            a correction of these cells. Also empty for a table with mistakes, and for a comparison without a
+            fit.
         hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
             offsets.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
@@ -174,7 +180,10 @@ class TableComparison:
 
     @property
     def rounding_metres(self) -> float:
-        """Largest distance (m) between tips that rounding can cause; the displacements are also rounded."""
+        """Largest distance (m) between two tips that rounding errors can cause.
+
+        The displacements of prismatic joints contribute to the rounding errors.
+        """
         return self.rounding * (self.reach + self.travel)
 
     @property
@@ -209,8 +218,9 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether a prismatic joint's limits are finite and allow more than one value.
 
-    A comparison also moves a joint with equal limits: at a single value, the samples do not depend on the
-    direction of the joint's axis. The default of both limits is 0, so a URDF may omit the limits.
+    A comparison ignores equal limits, and moves the joint. If the joint did not move, the samples would not
+    depend on the direction of the joint's axis. The default of both limits is 0, so a URDF may omit the
+    limits.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 

@@ -28,7 +28,8 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (metres) of each joint with sign -1. Among otherwise equal alignments, the URDF's signs cost least.
+#: Cost (metres) of each joint with sign -1. If several alignments fit equally well, the alignment with the
+#: URDF's joint signs is therefore preferred.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _PRISMATIC_WEIGHT = 1e-3
@@ -62,12 +63,13 @@ class _PartialAlignment:
     """Joint signs and offsets for the first joints of the chain.
 
     Attributes:
-        cost: Sum of the differences between cells (metres); angles are multiplied by the reach.
+        cost: Weighted sum of the differences between cells, plus the cost of reversed joints (metres). Angles
+            are multiplied by the reach.
         offsets: Joint offsets of these joints. The offset of the last of these joints is not yet known.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         delta_in: Offset along z from the last joint's DH frame to its URDF frame (metres).
-        free_offset: Row index and sign of a joint offset that can be chosen freely, because axes coincide.
-            The sign is the direction in which this offset rotates x.
+        free_offset: Row index and sign of a joint offset that can be chosen freely, because the direction of
+            x is free. The sign is +1 or -1: the direction in which this joint offset rotates x.
     """
 
     cost: float
@@ -99,7 +101,7 @@ def find_sign_fits(
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
     # If axes nearly coincide, many directions of x are nearly equivalent.
-    # A fit that starts with one of these directions can reach each of the others.
+    # A fit that starts with one of these directions of x can reach each of the other directions.
     # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
@@ -111,7 +113,8 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
     """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # A joint offset that can be chosen freely can reverse x. Both directions of x are then equivalent.
+        # If a joint offset can be chosen freely, a change of this offset by pi reverses x.
+        # Both directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
@@ -119,9 +122,9 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return the constant pose A_k.
+    """Return the constant pose A_k between two frames.
 
-    If the joint before or after A_k has sign -1, the z axis of this joint is reversed.
+    A joint frame with sign -1 is turned by pi about x, so that its z axis is reversed.
     """
     A = chain.constants[k]
     A = _HALF_TURN @ A if sense_before < 0 else A
@@ -131,7 +134,10 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Extend an alignment from joint i to joint i + 1; try both directions of x."""
+    """Add joint i + 1 to an alignment of the joints 0 to i.
+
+    The result has an alignment for each possible transform between the axes, with both directions of x.
+    """
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)

@@ -294,9 +294,9 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value (rad or m) of the joint that the joint of a row mimics.
+    """Return the largest absolute value (rad or m) of the mimicked joint of a row with a mimic rule.
 
-    If the table has no row of the mimicked joint, the limits of the mimic joint limit its value.
+    If the table has no row of the mimicked joint, this value follows from the limits of the mimic joint.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0

@@ -1,9 +1,8 @@
 """Export a table for two toolboxes: roboticstoolbox (Python) and MATLAB's Robotics System Toolbox.
 
-For roboticstoolbox the code makes a `DHRobot`. The rows of a DHRobot have
-four parameters, and a DHRobot has at least one joint. A table with Hayati rows, which have five parameters,
-or without rows therefore becomes a `Robot` of elementary
-transforms (Haviland and Corke).
+For roboticstoolbox the code makes a `DHRobot`. The rows of a DHRobot have four parameters, but Hayati rows
+have five parameters. A DHRobot has at least one joint. A table with Hayati rows, or a table without rows,
+therefore becomes a `Robot` of elementary transforms (Haviland and Corke).
 
 For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
 ignore theta of a revolute joint and d of a prismatic joint, and have no fifth parameter. The code therefore
