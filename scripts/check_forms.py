@@ -204,7 +204,7 @@ class Subject:
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # A table without lengths still has rounding errors of its angles.
+        # Even if all lengths of a table are zero, its angles have rounding errors.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

@@ -97,7 +97,7 @@ class Worker:
 
 
 def work(seed: int, pipe: Connection) -> None:
-    """Run in the worker process: for each family and number that arrive, send the outcome."""
+    """Receive the family and number of a case, test the case, and send the outcome, until killed."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

@@ -66,7 +66,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: For each option of `check`: the limit that it raises, and its unit.
+#: Options of `check` that set a size limit, each with the default limit and its unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),

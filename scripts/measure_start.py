@@ -68,7 +68,7 @@ def seconds(words: Sequence[str], cache: Path | None) -> float:
 
 
 def medians(rounds: int, folder: Path) -> list[float]:
-    """Return the times of the rows; the first round writes the bytecode and does not count."""
+    """Return the median processor time (s) of each row. The first round only writes bytecode files."""
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     found: list[list[float]] = [[] for _ in ROWS]

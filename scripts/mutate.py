@@ -100,7 +100,7 @@ class Named:
 
     @property
     def file(self) -> Path:
-        """The file of the innermost module whose name begins the name of the function."""
+        """The file that contains the code to replace."""
         path = ROOT
         for name in self.function.split("."):
             if not (path / name).is_dir():
@@ -135,7 +135,7 @@ class Mutant:
     file: str
     line: int
     what: str  # the text before and after
-    place: str  # the function that contains the mutant; unlike `line`, it survives other changes of the file
+    place: str  # the function that contains the mutant; line numbers change more often than this name
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A result without a value, which stores the numbers it is computed from.
+    """A number without a value. It stores the numbers from which it is computed.
 
     `constant` is the value of a constant 0 or 1, and None for all other numbers.
     """

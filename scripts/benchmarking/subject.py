@@ -25,7 +25,7 @@ TIP = "tip"
 class Subject:
     """The common input of all contenders: one robot and frame, q (n, nq), v and a (n, nv).
 
-    Mimic joints are independent, so that every library has the same coordinates.
+    The robot is loaded without mimic rules, so that every library has the same coordinates.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size of a file to mutate, in bytes; larger files only take longer.
+#: Maximum size (bytes) of a robot file of which mutants are made. Larger files are slow and are left out.
 LARGEST = 150_000
 
 ODD_NUMBERS = (

@@ -32,7 +32,7 @@ class Change:
     `place` is an index of the list, or the name of a field of the node.
     """
 
-    shown: ast.AST  # The text of this node is printed.
+    shown: ast.AST  # The description of the mutant quotes the text of this node.
     home: Any
     place: int | str
     value: Any
@@ -128,7 +128,7 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _readings(code: str) -> list[list[ast.AST]]:
-    """Return the readings of a piece of code: an expression; or else statements and keyword arguments."""
+    """Parse code as an expression. If the code is no expression, parse it as statements and as arguments."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
@@ -140,7 +140,7 @@ def _readings(code: str) -> list[list[ast.AST]]:
 
 
 def _parsed(code: str, kind: type) -> list[ast.AST]:
-    """Parse code into expressions, keyword arguments or statements, as `kind` is a class of one of these."""
+    """Parse code into nodes of one kind: expressions, statements or keyword arguments."""
     if issubclass(kind, ast.stmt):
         return [*ast.parse(code).body]
     if issubclass(kind, ast.expr):

@@ -106,7 +106,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Commands that error messages suggest. Each value lists the unknown commands for a suggestion.
+#: Commands that error messages suggest. Each value lists the words for which urdfkin suggests the key.
 _SYNONYMS = _by_word(
     {
         "--help": "help usage man",
@@ -135,7 +135,7 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for computations that urdfkin does not offer. Each value lists the unknown commands for an advice.
+#: Advice for computations that urdfkin does not offer. Each value lists the words that get this advice.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"

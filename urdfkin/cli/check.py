@@ -456,8 +456,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
         """Return whether a file, and each file that it may include, is the same as in `version`.
 
-        Every file of `version` with a suffix in `suffixes` counts as included. A deleted file also counts as
-        included if its name occurs in the text.
+        Every file of `version` with a suffix in `suffixes` is treated as an included file. A deleted file is
+        treated in the same way if its name occurs in the text.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = version.has_changes(suffixes)

@@ -270,7 +270,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # The columns x, y and z need three numbers for each unit. A position with a quaternion has seven numbers.
+    # A table with columns x, y and z needs three numbers in each row. A pose with a quaternion has seven.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
@@ -452,8 +452,8 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
     Each row of the table belongs to one entry of v, for example a joint velocity. The row lists the time
-    derivatives of the frame's position and orientation (Euler angles or a quaternion). For these derivatives,
-    this entry of v is 1, and all other entries are 0.
+    derivatives of the frame's position and orientation (Euler angles or a quaternion). In the row
+    of an entry, this entry of v is 1, and all other entries of v are 0.
     `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import NEAREST
