@@ -48,7 +48,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return result | {"right": bool(found) and moves_alike(found, a, b, ROUNDING)}
-    # Rounding to four digits leaves some files unchanged. Every verdict is therefore accepted for this change.
+    # Rounding to four digits leaves some files unchanged. Every verdict is then accepted.
     result["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
     tools = {tool.b for tool in found.tools}
     frames = [frame for frame in found.frames if frame.frame_b not in tools and frame.q_a]
