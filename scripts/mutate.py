@@ -72,7 +72,10 @@ def _texts() -> dict[Path, str]:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return the tests that mention a module, and the tests of its package (if none: of the whole robot)."""
+    """Return the tests that mention a module, and the tests of the module's package.
+
+    If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
+    """
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"

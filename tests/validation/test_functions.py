@@ -127,7 +127,7 @@ def test_the_diagnosis_names_a_wrong_frame(name: str, quantity: str) -> None:
     joint = next(i for i in reversed(tree.path(tree.frame_link(frame))) if tree.joints[i].kind.nv)
     other = tree.links[tree.joints[joint].parent]  # the link before the last moving joint
     found = check(name, quantity, computed(robot, quantity, f"link:{other}"))
-    check_diagnosis(found, f"returns the result of the frame {other!r}")
+    check_diagnosis(found, f"computes the result for the frame {other!r}")
 
 
 def flip(x: np.ndarray, at: list[int]) -> np.ndarray:
@@ -378,7 +378,7 @@ def test_a_mistake_that_leaves_two_percent_of_the_difference_is_not_reported() -
         return T
 
     found = verify_function(at_the_arm, robot, "placement", frame="at_1")
-    assert found.diagnoses == ("the function returns the result of the frame 'arm' instead of 'at_1'",)
+    assert found.diagnoses == ("the function computes the result for the frame 'arm' instead of 'at_1'",)
 
 
 def test_equal_messages_share_a_line_and_a_transposed_result_is_named() -> None:

@@ -178,7 +178,7 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch with Python numbers; stop and return None if a kernel is faster.
+    """Compute a batch without a kernel; return None as soon as `preload` provides a kernel.
 
     Otherwise, return 1 if an input is nan, infinite or too large, else 0.
     """

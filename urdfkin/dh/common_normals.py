@@ -5,10 +5,11 @@ this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-Rz(phi) and Tz(delta) commute with the motion of the first joint, so they are part of the first joint's row.
-Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so they are part of the second
-joint's row. For skew axes, beta is 0, and the other six numbers are unique except for the direction of x
-(Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
+The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
+motion of the first joint, so they are part of its row. In the same way, the factors Rz(phi_next) and
+Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0, and the other six numbers are
+unique except for the direction of x (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel
+and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
 angles theta about coinciding axes. `match_axis_transforms` copies d and theta from a reference table, except

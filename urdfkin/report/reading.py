@@ -107,9 +107,10 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Yield errors of the indices of joints, and of the numbers of coordinates and joint velocities.
+    """Check the indices of joints, and how many coordinates and joint velocities a model has.
 
-    A joint has an index in q and an index in v. A mimic joint has the indices of its mimicked joint.
+    Yield a text for each error. A joint has an index in q and an index in v. A mimic joint has the indices of
+    its mimicked joint.
     """
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:

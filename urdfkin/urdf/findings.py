@@ -418,7 +418,7 @@ MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 #: If more errors than this have the same code, the further errors are combined into one.
 MAX_ERRORS_PER_CODE = 100
 
-#: Maximum number of complete findings with one code. For further findings, only the line number is stored.
+#: If more findings than this have the same code, only the line numbers of the further findings are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
 

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: Largest remainder (see `Diagnosis.remainder`) at which a mistake explains the results.
+#: A mistake explains wrong results if at most this fraction of the difference remains.
+#: The remaining difference is the difference from urdfkin's results with the same mistake.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
 #: Number of configurations in a fast test whether two joints are exchanged.
@@ -402,7 +403,7 @@ class Mistakes:
         for k, name in enumerate(names):
             title = name.removeprefix("link:")
             yield (
-                f"the function returns the result of the frame {title!r} instead of {self.frame!r}",
+                f"the function computes the result for the frame {title!r} instead of {self.frame!r}",
                 partial(np.asarray, every[:, k]),
             )
 

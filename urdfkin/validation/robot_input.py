@@ -75,7 +75,7 @@ class RobotInput:
         return text
 
     def with_text(self) -> RobotInput:
-        """Return a copy that contains the text, for a machine without the file."""
+        """Return a copy that contains the robot's text, so that another machine does not need the file."""
         text = self.text()
         return replace(self, source=text.data, file=text.label)
 

@@ -44,7 +44,8 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
 
 #: Number of 8-byte words in the header of a Python object.
 _HEADER_WORDS = object.__basicsize__ // 8
-#: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
+#: A Python object consists of 8-byte words. `_TYPE` is the index of the word that refers to the type.
+#: `_ITEMS` is the index of the word that refers to a tuple's first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The lower four bytes of the word `_NDIM` contain the number of axes.

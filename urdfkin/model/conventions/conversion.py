@@ -354,7 +354,10 @@ class Conversion:
 
     @property
     def velocity_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., velocity_permutation]`; None if the conversion changes numbers."""
+        """Index array with which `v[..., velocity_permutation]` is the tool's v.
+
+        None if the conversion does more than reorder the numbers.
+        """
         return self._v_index.copy() if self._plain_v else None
 
     @cached_property

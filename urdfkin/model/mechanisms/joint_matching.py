@@ -126,7 +126,10 @@ class JointMatcher:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each axis at A's body coincides with an axis at B's body, after B moves by X."""
+        """Return whether each joint axis of a body of A coincides with a joint axis of a body of B.
+
+        `bodies` are the two bodies. The pose X first moves the body of B.
+        """
         return all(
             any(
                 motion_type(self.a.joint(e).kind) == motion_type(self.b.joint(f).kind)

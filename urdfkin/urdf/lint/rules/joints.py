@@ -508,8 +508,8 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Multiples of pi, each with a minimum number of decimals.
-#: A number in the file with fewer decimals is not reported as a rounded multiple of pi.
+#: Multiples of pi. A number in a file may be reported as a rounded multiple of pi.
+#: The number must then have at least as many decimals as this table states for the multiple.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
