@@ -24,8 +24,9 @@ from urdfkin.compiled.plan import (
 from urdfkin.kinematics.arithmetic import bind_equations
 
 #: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
-#: The reduction of the angle to r takes 10 operations. The computation of z = r^2, of 1 - z/2 and of their
-#: rounding errors takes 8 operations. The polynomials take 20 operations, and the last steps take 13.
+#: The reduction of the angle to r takes 10 operations.
+#: The computation of z = r^2, of 1 - z/2 and of their rounding errors takes 8 operations.
+#: The polynomials take 20 operations, and the last steps take 13.
 _SINE_COSINE = 51
 
 

@@ -136,10 +136,11 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure(table, works, rounds, works[1])
 
 
-# The time of a step of a batch is the difference between the times of two kernels. Only one of these kernels
-# has the step's instructions. For a call for one configuration, the benchmark also measures calls that do
-# only a part of the work, such as a call with a rejected argument. The time of a step is a difference of
-# these measured times.
+# The time of a step of a batch is the difference between the times of two kernels.
+# Only one of these kernels has the step's instructions.
+# For one configuration, the benchmark also measures calls that do only a part of the work.
+# An example is a call with a rejected argument.
+# The time of a step is a difference of these measured times.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {

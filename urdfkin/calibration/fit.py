@@ -75,8 +75,9 @@ from urdfkin.verify.singular_values import singular_values
 _PIVOT_FRACTION = 0.5
 #: A message names at most this number of fitted parameters that have the same effect as a fixed parameter.
 _MAX_NAMES = 3
-#: A parameter stays fixed if fitted parameters together have the same effect. A message lists these fitted
-#: parameters. The message omits a fitted parameter that contributes at most this fraction of the effect.
+#: A parameter stays fixed if fitted parameters together have the same effect.
+#: A message lists these fitted parameters.
+#: The message omits a fitted parameter that contributes at most this fraction of the effect.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -191,8 +192,8 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
 _MIN_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
-#: Along the eigenvector of such an eigenvalue, the fitted parameters cancel a measurement error. The
-#: residuals then do not show this error.
+#: Along the eigenvector of such an eigenvalue, the fitted parameters cancel a measurement error.
+#: The residuals then do not show this error.
 _EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20

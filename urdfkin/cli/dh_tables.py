@@ -263,8 +263,7 @@ def _better_interpretation(
         return None
     metres = found.metres
     if not found.is_fitted:
-        # `find_better_interpretation` fits every interpretation, so the interpretation of the file is fitted
-        # too.
+        # `find_better_interpretation` fits every interpretation, also the interpretation of the file.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None

@@ -34,8 +34,8 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about joint values that look like degrees. Therefore, DegreesWarning is
-    # hidden.
+    # Commands print their own line about joint values that look like degrees.
+    # Therefore, DegreesWarning is hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -114,8 +114,8 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of an unfinished line that is stored whole. The next piece of text may complete a CI command
-#: that begins in this line.
+#: Maximum length of an unfinished line that is stored whole.
+#: The next piece of text may complete a CI command that begins in this line.
 _MAX_STORED = 64
 
 

@@ -319,9 +319,8 @@ class Sameness(Displayable):
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
         rounding: (m, rad) the largest distance and angle between matching frames that rounding errors can
             cause.
-        unlimited: Joints of A without limits that translate: planar and floating joints, and prismatic joints
-            without a largest travel. All bounds on distances hold while each of these joints travels at most
-            10 m.
+        unlimited: Planar and floating joints of A, and prismatic joints with unlimited travel. All bounds on
+            distances hold while each of these joints travels at most 10 m.
         single: (m, rad) bound on the distance and the angle between matching frames that single precision can
             cause. None if no file has single precision.
         unexplained: Differences of the unchanged models at one joint or link that rounding does not explain.

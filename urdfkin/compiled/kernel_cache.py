@@ -18,8 +18,8 @@ from urdfkin.system.locks import import_lock, make_fork_safe_lock
 #: Lock that a thread holds while it imports Numba or compiles a kernel.
 #: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
-#: The import of Numba acquires this lock first and then `logging`'s lock, so `logging`'s lock must be
-#: created earlier.
+#: The import of Numba acquires this lock first and then `logging`'s lock.
+#: Therefore, `logging`'s lock must be created earlier.
 compile_lock = make_fork_safe_lock()
 
 #: A function with two arguments: the kernel's name, and the duration (s), or None when compilation begins.

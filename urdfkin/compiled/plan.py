@@ -336,15 +336,17 @@ class ProgramHeader(IntEnum):
 LANES = 8
 #: Number of integers for an instruction: the operation, three operands, and the index of its constants.
 INSTRUCTION_WIDTH = 5
-#: Number of integers that describe a joint angle in a program: the scratch row of the angle, the scratch row
-#: of the sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
+#: Number of integers that describe a joint angle in a program.
+#: The integers are the scratch rows of the angle and of its sine, the index of the mimic rule, and a flag.
+#: The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: Rows of scratch memory. Row 0 contains the number 0, and row 1 contains the number 1.
 #: Rows 2 to 17 contain the results of a frame, row 18 a joint angle, and later rows all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers for one Jacobian column in a Hessian. The integers are the scratch row of the column,
-#: the joint's row in `steps`, the joint's index in v, and the scratch row of the running sum.
+#: Number of integers for one Jacobian column in a Hessian.
+#: The first two integers are the scratch row of the column, and the joint's row in `steps`.
+#: The other two are the joint's index in v, and the scratch row of the running sum.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {

@@ -291,8 +291,7 @@ def _choose_offset(
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # If the rows i to end - 1 contain a Hayati row, d is chosen to give this row the
-        # reference's a.
+        # If the rows i to end - 1 contain a Hayati row, d is chosen to give this row the reference's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

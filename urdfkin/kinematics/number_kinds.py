@@ -73,8 +73,9 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: Copies of the textbook's equations that compute scales. The arguments of the copies are lengths of vectors
-#: and absolute values of numbers. Arguments that are arrays follow NumPy's broadcasting rules.
+#: Copies of the textbook's equations that compute scales.
+#: The arguments of the copies are lengths of vectors and absolute values of numbers.
+#: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,
     minus=add,

@@ -221,8 +221,8 @@ SINGLE_POLYNOMIAL = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
-#: The worst case is 18.9 eps: the sum of the docstring's first table without the row "rotation about the
-#: axis".
+#: The worst case is 18.9 eps.
+#: It is the sum of the docstring's first table without the row "rotation about the axis".
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Error (in eps) of the directions of two joint axes.
@@ -242,8 +242,8 @@ LENGTH_ROUNDINGS = 4.0
 # Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
 #: Error (in eps) of an angle up to pi.
-#: A computed multiple of pi/12 has an error of 1.2, a value of arctan2 has an error of 1.1, and a number in
-#: a file has an error of 1.0.
+#: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
+#: A number in a file has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
@@ -260,8 +260,8 @@ ROTATION_ROUNDINGS = 8.0
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
-#: The sum of the four errors is 2.0. `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the
-#: converted range are accepted.
+#: The sum of the four errors is 2.0.
+#: `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the converted range are accepted.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 

@@ -105,8 +105,8 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m),
-#: and by more than `_FAR_FRACTION` times the joint's range.
+#: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
+#: The excess must also be more than `_FAR_FRACTION` times the joint's range.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 

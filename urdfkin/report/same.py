@@ -447,8 +447,8 @@ def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The first row is the direction in space that points to the right on the page. The second row is the
-    # direction that points down on the page.
+    # The first row is the direction in space that points to the right on the page.
+    # The second row is the direction that points down on the page.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

@@ -1662,8 +1662,8 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # The key is a plain name where possible, because the hash of an enumeration member is slow.
-        # All other keys contain the type of `frame`. The reason is that `LinkFrame("link:a") == "link:a"`,
-        # although `LinkFrame("link:a")` and the str "link:a" can name different frames.
+        # All other keys contain the type of `frame`.
+        # `LinkFrame("link:a")` is equal to the str "link:a", but the two can name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

@@ -211,9 +211,10 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # The velocity v is s' * step, and the acceleration a is s'' * step. Here s' and s'' are the first and the
-    # second time derivative of s. The same formulas hold for planar and floating joints. For such a joint,
-    # `step` contains the joint's constant twist in the axes of the moving frame.
+    # The velocity v is s' * step, and the acceleration a is s'' * step.
+    # Here s' and s'' are the first and the second time derivative of s.
+    # The same formulas hold for planar and floating joints.
+    # For such a joint, `step` contains the joint's constant twist in the axes of the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 

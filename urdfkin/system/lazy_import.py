@@ -47,8 +47,8 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # `metadata` imports many modules. At the start of urdfkin, files in the current folder could replace
-    # these modules.
+    # `metadata` imports many modules.
+    # At the start of urdfkin, files in the current folder could replace these modules.
     from importlib import metadata
 
     try:

@@ -43,8 +43,8 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
     return '"' + shorten(text, limit).replace('"', '\\"') + '"'
 
 
-#: A line of more than `MAX_EXCERPT_LENGTH` characters is cut. At most `MAX_EXCERPT_LEAD` characters precede
-#: the underlined text.
+#: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
+#: At most `MAX_EXCERPT_LEAD` characters precede the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB = "    "

@@ -119,7 +119,8 @@ def _serialize(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                if isinstance(child.tag, str):  # In a comment or an instruction, `tag` is a function.
+                # The tag of an XML comment or of a processing instruction is a function.
+                if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:

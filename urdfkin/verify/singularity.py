@@ -147,8 +147,8 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # For an arm with fewer joints than Jacobian rows, the directions without motion depend on the
-        # configuration.
+        # The arm may have fewer joints than the Jacobian has rows.
+        # Then the directions without motion depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -268,8 +268,8 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        # Three linearly dependent lines that are parallel or concurrent lie in one plane; four such lines
-        # need not.
+        # Three linearly dependent lines that are parallel or concurrent lie in one plane.
+        # Four such lines need not lie in one plane.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.

@@ -167,8 +167,9 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: One pair for the linear and one for the angular differences. The first value is multiplied by the
-    #: relative rounding error; the second value is the effect of snapping.
+    #: One pair for the linear and one for the angular differences.
+    #: The first value is multiplied by the relative rounding error.
+    #: The second value is the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (

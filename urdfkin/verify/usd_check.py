@@ -40,8 +40,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in
-#: `_check_joint`).
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF`.
+#: `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
 #: Number of rounding errors in a joint's origin (derived in `_check_joint`).
 _ORIGIN_ROUNDINGS = 3.0

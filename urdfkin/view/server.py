@@ -165,8 +165,9 @@ LOOPBACK = "127.0.0.1"
 
 #: The only message that the server accepts from a page: a control has changed.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Two replacements in viser's page. The first adds the nonce to viser's script. This script creates a script
-#: element, to which the second replacement adds the nonce.
+#: Two replacements in viser's page.
+#: The first adds the nonce to viser's script.
+#: This script creates a script element, to which the second replacement adds the nonce.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),

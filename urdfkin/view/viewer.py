@@ -135,8 +135,8 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that already has the value is not set again, because a conversion of units could
-                # round the value.
+                # A slider that already has the value is not set again.
+                # A conversion of units could otherwise round the value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:

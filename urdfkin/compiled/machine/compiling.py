@@ -142,8 +142,8 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Without fast math, the compiler neither reorders nor fuses operations. The module `numbers` decides which
-#: operations are fused.
+#: Without fast math, the compiler neither reorders nor fuses operations.
+#: The module `numbers` decides which operations are fused.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.

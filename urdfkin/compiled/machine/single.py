@@ -57,7 +57,8 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS + 5,
     _HEADER_WORDS + 6,
 )
-#: Index of the word with the byte order and the type number of an array's elements (PyArray_Descr in C).
+#: Index of a word in the C structure PyArray_Descr, which describes the elements of an array.
+#: This word contains the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.
@@ -202,8 +203,8 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: For each quantity: the kernel, the kernel for LOCAL, the number of inputs, and the number of axes of the
-#: result array that have the length nv.
+#: For each quantity: the kernel, the kernel for LOCAL, and the number of inputs.
+#: The last number is the number of axes of the result array that have the length nv.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),

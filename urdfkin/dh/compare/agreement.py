@@ -41,15 +41,15 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported only if their correction reduces the tip error to this fraction, or to
-#: `NEGLIGIBLE_ERROR`.
+#: Differing cells are reported only if their correction reduces the tip error to this fraction.
+#: A tip error of at most `NEGLIGIBLE_ERROR` also suffices.
 _CORRECTED_FRACTION = 0.5
-#: If a table does not agree, the correction of a mistake must reduce the tip error to this fraction, or to
-#: the tolerance.
+#: If a table does not agree, the correction of a mistake must reduce the tip error to this fraction.
+#: A tip error within the tolerance also suffices.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Suppose that n cells differ without a fit, and m cells differ after a fit. The n cells are reported only if
-#: n - m is at most this number.
+#: Suppose that n cells differ without a fit, and m cells differ after a fit.
+#: The n cells are reported only if n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: If the tip moves by less than this fraction of the path length, the reach is the path length.
 _FIXED_TIP_SPREAD = 1e-6

@@ -35,8 +35,9 @@ _PARALLEL_TILT = 2e-2
 #: Cost of each difference from the file's interpretation, as a fraction of the smallest difference of shapes.
 #: The tolerance is added to this cost.
 _DIFFERENCE_COST = 0.1
-#: The tip error of a better interpretation is at most this fraction of the tip error of the file's
-#: interpretation, and at most this fraction of the reach. A tip error within the tolerance always suffices.
+#: The tip error of a better interpretation is at most this fraction of the reach.
+#: It is also at most this fraction of the tip error of the file's interpretation.
+#: A tip error within the tolerance always suffices.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)

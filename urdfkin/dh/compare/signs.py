@@ -28,8 +28,8 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (metres) of each joint with sign -1. If several alignments fit equally well, the alignment with the
-#: URDF's joint signs is therefore preferred.
+#: Cost (metres) of each joint with sign -1.
+#: If several alignments fit equally well, the alignment with the URDF's joint signs is therefore preferred.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _PRISMATIC_WEIGHT = 1e-3
@@ -207,9 +207,8 @@ def _possible_transforms(
         # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # `find_axis_transform` makes a Hayati row if the common normal is farther than the reach from an
-        # origin. With reach 0, `find_axis_transform` makes a Hayati row unless the common normal meets both
-        # origins.
+        # If the common normal is farther than the reach from an origin, the row becomes a Hayati row.
+        # With reach 0, `find_axis_transform` makes a Hayati row unless the common normal meets both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -58,8 +58,8 @@ LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: Of two scores, the score with more agreeing links and axes is better.
-#: If both numbers are equal, compare the largest differences (m) of the two scores: the better score's
-#: difference must be less than this factor times the other score's difference.
+#: If both numbers are equal, the largest differences (m) of the two scores are compared.
+#: The better score's difference is less than this factor times the other score's difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.

@@ -663,8 +663,9 @@ class MatchedValues:
     #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: This value (rad or m) is then the difference of the two constants before this step, minus the rounding
-    #: error of one joint, but at least 0. Otherwise, the value is 0.
+    #: This value (rad or m) is then the difference of the two constants before this step.
+    #: The rounding error of one joint is subtracted, but the value is at least 0.
+    #: Otherwise, the value is 0.
     rounding: float = 0.0
 
     @property

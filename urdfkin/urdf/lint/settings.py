@@ -274,8 +274,8 @@ def find_known_findings(
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
-        # every finding is new.
+        # urdfkin cannot expand the older xacro file.
+        # If a file has changed that the xacro file could include, every finding is new.
         return Baseline(Counter()) if version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
     old_data = text.data if is_unchanged else version.read_file(path)

@@ -29,8 +29,8 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each velocity of a joint: index of the velocity's axis in the child link (0: x), and whether the
-#: velocity is angular.
+#: For each velocity of a joint: index of the velocity's axis in the child link (0 is x).
+#: The second entry is True for an angular velocity.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),

@@ -407,7 +407,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = "name the independent joint of the chain, because some readers apply only one rule"
+            remedy = "mimic the joint that no rule moves, because some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
@@ -497,9 +497,9 @@ SUSPICIOUS_LENGTH = 100.0
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number, at least `SUSPICIOUS_LIMIT` and less than
-#: `PLACEHOLDER_LIMIT`. For a joint without limits, some exporters write limits of at least
-#: `PLACEHOLDER_LIMIT`.
+#: A limit is probably in degrees if it is a whole number from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT`.
+#: `PLACEHOLDER_LIMIT` itself is excluded.
+#: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
 #: If a rounded multiple of pi displaces a link by more than this length (m), the finding is a warning.
