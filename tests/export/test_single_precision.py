@@ -247,7 +247,7 @@ def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
 
 @given(st.floats(1e-300, 1e300))
 @example(3.9268392647265107)
-def test_a_printed_bound_is_round_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x: float) -> None:
+def test_a_printed_bound_is_rounded_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x: float) -> None:
     assert x <= float(proof._round_up(x)) <= x * (1.0 + 2e-6)
     assert x * (1.0 - 1e-5) <= float(proof._round_down(x)) <= x
     assert proof._round_up(np.inf) == proof._round_down(np.nan) == "0.0"
