@@ -6,12 +6,11 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 
 The folder of a package `name` is the first of these folders that exists:
 
-1. For each folder `src` in `ROS_PACKAGE_PATH`: first the folder `src`, but only if it is called `name`.
-   Then `src/name`, and then each `src/*/name`.
+1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself, then `src/name`, then each `src/*/name`.
+   `src` itself is omitted unless the folder is called `name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above `referring_file`: first the folder itself, but only if it is called `name`,
-or if
-   its `package.xml` contains this name. Then the subfolder `name`.
+3. For each folder above `referring_file`: the folder itself, then its subfolder `name`.
+   The folder itself is omitted unless the folder is called `name` or its `package.xml` contains this name.
 """
 
 from __future__ import annotations

@@ -68,7 +68,8 @@ class ExcerptFormatter:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # A line may have megabytes, so it is not decoded for every finding.
+        # A line may be several megabytes long, so it is not decoded again for the next finding on the line.
+        if self.number != finding.line:
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -415,10 +416,11 @@ MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 #: `MIN_FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: If more errors than this have the same code, the further errors are combined into one.
+#: Maximum number of errors with one code that are reported separately.
 MAX_ERRORS_PER_CODE = 100
 
-#: If more findings than this have the same code, only the line numbers of the further findings are stored.
+#: Maximum number of findings with one code and severity that are stored completely.
+#: For further findings, only the line numbers are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
 

@@ -119,7 +119,7 @@ def _serialize(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                # The tag of an XML comment or of a processing instruction is a function.
+                # The copy omits comments and processing instructions, whose tag is a function in ElementTree.
                 if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
@@ -189,7 +189,8 @@ class _ModelReader:
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
         """For each body whose frame is a joint frame, yield the index of the joint and of the body.
 
-        The last body comes first, so a dictionary keeps the first body of each joint.
+        The bodies are in reverse order. If a joint has several bodies, a dictionary therefore keeps the first
+        of these bodies.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

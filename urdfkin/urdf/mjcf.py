@@ -153,10 +153,10 @@ class Mjcf:
         return self._frame_values(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return a sum of absolute hinge angles, in rad, for each frame, shape (n, frames).
+        """Return the sum of |q| + |ref| (rad) over the hinges of each frame, shape (n, frames).
 
-        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is
-        nonzero. Bounds on rounding errors contain this sum.
+        The hinges of a frame are the hinges between the world and the frame. A hinge is omitted if its
+        reference value `ref` is zero. Bounds on rounding errors contain this sum.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -174,9 +174,10 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return the values of all frames (n, frames), from the values `at_body` (n, bodies) of the bodies.
+        """Return one number for each frame, shape (n, frames).
 
-        The value of a site is the value of its body plus the number of the site in `own` (sites,).
+        The number of a body is in `at_body`, shape (n, bodies). A site has the number of its body plus the
+        site's own number in `own`, shape (sites,).
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -201,11 +202,13 @@ class Mjcf:
         return out
 
     def rule_scales(self, q: FloatArray) -> FloatArray:
-        """For each mimic rule, return a number for the bound on its rounding error, shape (n, equalities).
+        """Return a number for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
+
+        The bound on the rounding error of a mimic rule is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint. The bound is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
+        rules from y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.mimic_equalities}

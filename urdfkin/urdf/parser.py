@@ -422,9 +422,10 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`.
+    """Read numbers from attributes, and report mistakes.
 
-    `effect` is appended to these messages.
+    `bad_number` is the rule about an invalid number. `bad_vector` is the rule about a wrong count of numbers.
+    `effect` is appended to the messages of both rules.
     """
 
     report: Reporter
@@ -832,7 +833,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    # A name in the file may have megabytes, and the cache must not store such a name.
+    # A name in the file may be several megabytes long, and the cache must not store such a name.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
 

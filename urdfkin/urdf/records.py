@@ -26,7 +26,7 @@ class SizeLimits:
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
         markup: Maximum number of bytes of one tag, comment or processing instruction. The default is the
-            limit of libxml2. urdfkin measures the number of bytes with an error of at most 1 MB.
+            limit of libxml2. urdfkin may accept up to 1 MB more, because it reads the file in pieces.
     """
 
     bytes: int = 100_000_000

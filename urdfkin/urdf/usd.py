@@ -53,7 +53,7 @@ from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
 _MAX_LAYERS = 1_000
-#: A missing limit of a joint is written as infinity or as this largest number in single precision.
+#: In a USD file, a missing limit of a joint is infinity or the largest number in single precision.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: A frame has shear if the cosine between two of its axes exceeds the product `_MAX_SHEAR` u n.
 #: In this product, n is the number of prims on the path of the frame's prim.
@@ -64,8 +64,8 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Rounding changes the length of a stored quaternion by at most u.
 #: The cosine between two axes then changes by at most 4 u.
 _MAX_SHEAR = 14.0
-#: A joint with limits up to this angle (degrees) hardly moves.
-#: urdfkin does not report that such limits are probably in radians.
+#: A revolute joint hardly moves if its limits are at most this angle (degrees).
+#: The finding about limits that are probably in radians omits such a joint.
 _NEGLIGIBLE_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
@@ -337,7 +337,8 @@ class _JointPrim:
         name: At first the name of the prim; later the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in the two bodies.
-        rounding: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
+        rounding: Bounds on the displacement (m) and the rotation (rad) of the joint frame by rounding to
+            single precision.
     """
 
     prim: Any
@@ -620,11 +621,11 @@ class _StageReader:
     def _read_side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return four values about body i of a joint.
+        """Return the path of body i of a joint, the joint frame's pose (m) in the body, and two error terms.
 
-        The values are the path of the body (None for the world), the pose (m) of the joint frame in the body,
-        and the body's part of `_JointPrim.length_sum` and `_JointPrim.rounding`. Return None if the body does
-        not exist or is in a prototype of a point instancer.
+        The path is None for the world. The third value is the body's share of `_JointPrim.length_sum`. The
+        fourth value is the body's share of `_JointPrim.rounding`. Return None if the body does not exist or
+        is in a prototype of a point instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")
@@ -655,11 +656,11 @@ class _StageReader:
         return body, A, length, off
 
     def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
-        """Bound how far rounding to single precision moves (m) and rotates (rad) a prim relative to a body.
+        """Return bounds on the displacement (m) and the rotation (rad) of a prim relative to a body.
 
-        The body None is the world. If the rotation of a prim is rounded, the prim rotates, and all prims
-        below the prim also move. `length` is the sum of the lengths (m) of the translations from the body to
-        the prim. Transforms in half precision are ignored.
+        The cause of both is rounding to single precision. The body None is the world. If the rotation of a
+        prim is rounded, the prim rotates, and all prims below the prim also move. `length` is the sum of the
+        lengths (m) of the translations from the body to the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -957,7 +958,7 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, the joint frame is also the frame of the child link.
-        # A child frame with another pose needs a further link.
+        # If the frame of the child link differs from the joint frame, a link is inserted between them.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
@@ -1178,7 +1179,8 @@ def _quaternion_rounding(xyzw: FloatArray) -> float:
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
     four-dimensional box. Only the component of this vector that is perpendicular to the quaternion changes
-    the rotation. This component is longest at a corner of the box, so the function compares all corners.
+    the rotation. The length of this component is greatest at a corner of the box, so the function compares
+    all corners.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))

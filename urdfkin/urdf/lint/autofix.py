@@ -34,7 +34,8 @@ from urdfkin.urdf.lint.runner import Examination
 from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import UrdfText
 
-#: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
+#: Maximum number of passes of `--fix` over a file.
+#: In one pass, all applied fixes belong to findings with the same code, and do not overlap.
 MAX_PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.

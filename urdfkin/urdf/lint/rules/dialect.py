@@ -95,14 +95,14 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element, and the name of one of its attributes or None.
+#: An element and the name of an attribute; the name is None if the element itself is meant.
 _Occurrence = tuple[Element, str | None]
 
 
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Occurrence], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report the unexpanded xacro at `places`; return whether kinematics uses any of these elements."""
+    """Report unexpanded xacro in `places`; return whether kinematics uses any element of `places`."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (

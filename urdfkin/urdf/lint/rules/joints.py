@@ -323,8 +323,8 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 MAX_MIMIC_NUMBER = 1e6
-#: The limits of a mimic joint may exclude this fraction of the mimicked joint's range without a finding.
-#: Limits are often written with few digits, and therefore exclude a small fraction.
+#: If the limits of a mimic joint exclude at most this fraction of the mimicked joint's range, there is
+#: no finding URDF527. Limits are often written with few digits, and therefore exclude a small fraction.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -425,7 +425,7 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # Rounding errors narrow a range of one value to an empty range.
+        # A margin for rounding errors at each end can make a range of one value empty.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (

@@ -43,7 +43,8 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: MJCF elements that findings mention without a name: the tag in the file, and the tag in the finding.
+#: Tags of MJCF elements that findings mention without a name.
+#: The key is the tag in the file, and the value is the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Pattern for the start of a prim in a USD text file.
 #: The pattern also matches delimiters of comments, strings, references, arrays and blocks.
