@@ -91,7 +91,10 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method, of a prepared frame and, without checks, of a compiled frame."""
+    """Yield the calls of the robot's method and of a prepared frame.
+
+    If `verify` is False, also yield the calls of a compiled frame.
+    """
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)

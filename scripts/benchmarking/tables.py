@@ -14,7 +14,7 @@ from scripts.pages import table as markdown
 
 #: The measurements of one contender, as a mapping.
 Entry = Mapping[str, Any]
-_SHARE = "speed, generated code = 1"
+_SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 #: Title and row format of the sections that vary the number of joints, frames or configurations.
@@ -144,7 +144,7 @@ def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
     cost, single = section in ("checked", "verified"), section in ("single", "checked")
     what = "calls" if single else "results stored" if cost else "loop"
-    ratio = f"cost, Pinocchio's {what} = 1" if cost else f"speed, Pinocchio's {what} = 1"
+    ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {what}"
     remarks = list(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     ceiling = _generated(rows)
     cells = [
@@ -176,11 +176,9 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
     return {
         "": title,
         "1 thread, ns": number(one),
-        "speed, Pinocchio's loop = 1": number(who[ONE]["ratio"]),
-        "speed with all threads, Pinocchio's loop = 1": number(several["ratio"])
-        if several
-        else "one processor",
-        "speed compiled for this robot, 1 thread, Pinocchio's loop = 1": compiled,
+        "speed relative to Pinocchio's loop": number(who[ONE]["ratio"]),
+        "relative speed with all threads": number(several["ratio"]) if several else "one processor",
+        "relative speed compiled for this robot, 1 thread": compiled,
         _SHARE: number(ceiling / one) if ceiling else "not measured",
         "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
         "speed of urdfkin, 1 thread, relative to this library": number(best["median_ns"] / one),

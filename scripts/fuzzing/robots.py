@@ -68,7 +68,10 @@ def tame_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a length from 1e-320 to 1e300; the sum of several such lengths usually does not overflow."""
+    """Return a random length, positive or negative, with an absolute value from about 1e-320 to 1e301.
+
+    The sum of several such lengths usually does not overflow.
+    """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)

@@ -53,8 +53,8 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are equivalent but not the same, or have differences without effect on"
-    " motion, such as limits, or links that only one model has.",
+    help="Also exit 1 if the models are equivalent but not the same, or if any difference is listed, for"
+    " example of limits or links.",
 )
 @click.option(
     "--within",

@@ -32,7 +32,7 @@ _ROUNDING = 1e-12
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference table.
+    """Return a chain's table, and take the free choices of its frames from a reference table.
 
     `options.flip` must be the result of `find_reversed_joints`.
     """

@@ -396,7 +396,7 @@ def _sample(
 def _results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of a sample. A value is None if its error is too large for 17 digits."""
+    """Yield the results of a sample; a value is None if more digits are needed to round it to 17 digits."""
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)

@@ -89,7 +89,7 @@ def _make_wrong_module_error(module: Any) -> InstallationError:
         else "a file that belongs to no installed package"
     )
     return InstallationError(
-        "the installed module `pinocchio` is not the robotics library Pinocchio, which checks results",
+        "the installed module `pinocchio` is not the robotics library Pinocchio",
         where=str(file),
         found=found,
         remedy=f"Pinocchio's package is called pin: {repair}; pip install {_REQUIREMENT}",

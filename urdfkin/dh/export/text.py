@@ -131,10 +131,14 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = format_bound(snap.metres), format_bound(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
-    condition = f"limits and {TRAVEL_CONDITION}" if table.unlimited else "limits"
+    condition = ""
+    if any(not row.kind.turns for row in table.rows):
+        condition = "; this holds if prismatic joints are within their limits"
+    if table.unlimited:
+        condition += f" and {TRAVEL_CONDITION}"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad; this is guaranteed if prismatic joints are within their {condition}",
+        f"{radians} rad{condition}",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:

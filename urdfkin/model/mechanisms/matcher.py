@@ -777,7 +777,7 @@ class _Rule:
         slope: The product s m.
         constant: The product s c.
         free: Whether o can have any value, because no link and no axis after the joint determines o.
-        has_effect: Whether the joint moves a pair of matched links, or the axis of a later joint.
+        has_effect: True if the joint moves matched links, or the axis of a later joint.
     """
 
     step: int

@@ -267,7 +267,7 @@ def find_known_findings(
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
     An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
-    that it could include has changed. Findings about missing meshes are new if the text contains the name of
+    that it could include has changed. A finding about a missing mesh is new if the text contains the name of
     a file that was deleted since the older version.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
