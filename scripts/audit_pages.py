@@ -105,32 +105,32 @@ class Page:
     whole: bool = True  # whether to test the keyboard, the HTML and the printed page too
 
 
-def axe_script() -> str | None:
+def read_axe_script() -> str | None:
     if (path := TOOLS / "axe-core" / "axe.min.js").is_file():
         return path.read_text("utf-8")
     found = util.find_spec("axe_core_python")
     return (Path(str(found.origin)).parent / "axe.min.js").read_text("utf-8") if found else None
 
 
-def html_checker() -> Path | None:
+def find_html_checker() -> Path | None:
     path = TOOLS / "vnu-jar" / "build" / "dist" / "vnu.jar"
     return path if path.is_file() and shutil.which("java") else None
 
 
-def reports(folder: Path) -> dict[str, Callable[[], str]]:
+def report_makers(folder: Path) -> dict[str, Callable[[], str]]:
     right = PinocchioOracle.velocities
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
 
-    def page(robots: str | list[str], samples: int) -> str:
+    def make_report(robots: str | list[str], samples: int) -> str:
         return as_html(validate(robots, samples=samples).as_dict())
 
-    def disagreement() -> str:
+    def make_disagreement() -> str:
         """Make a report with disagreements: Pinocchio's velocities are multiplied by 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
-            return page(["panda", "ur5"], 6)
+            return make_report(["panda", "ur5"], 6)
 
-    def months() -> str:
+    def make_history() -> str:
         (folder / "runs").mkdir()
         for i, report in enumerate(months_runs()):
             (folder / "runs" / f"{i}.json").write_text(json.dumps(report), encoding="utf-8")
@@ -138,18 +138,18 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
         return history_page(read_history([folder / "runs"]))
 
     return {
-        "good": lambda: page(["panda", "ur5", "talos"], 6),
-        "one": lambda: page("panda", 20),
-        "unreadable": lambda: page([str(bad), "ur5"], 6),
-        "disagreement": disagreement,
-        "history": months,
-        "same-same": lambda: comparison("ur5", None),
-        "same-differs": lambda: comparison("ur10", None),
-        "same-within": lambda: comparison("ur5_limited", 1e-3),
+        "good": lambda: make_report(["panda", "ur5", "talos"], 6),
+        "one": lambda: make_report("panda", 20),
+        "unreadable": lambda: make_report([str(bad), "ur5"], 6),
+        "disagreement": make_disagreement,
+        "history": make_history,
+        "same-same": lambda: make_same_report("ur5", None),
+        "same-differs": lambda: make_same_report("ur10", None),
+        "same-within": lambda: make_same_report("ur5_limited", 1e-3),
     }
 
 
-def comparison(b: str, within: float | None) -> str:
+def make_same_report(b: str, within: float | None) -> str:
     robots = urdfkin.load("ur5"), urdfkin.load(b)
     return same_page(same(*robots, within=within), robots, SameQuestion(within))
 
@@ -169,7 +169,7 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
         yield Page(name, url, ready=ready, screens=screens, whole=False)
 
 
-def site(folder: Path) -> Iterator[Page]:
+def site_pages(folder: Path) -> Iterator[Page]:
     from mkdocs.commands.build import build
     from mkdocs.config import load_config
 
@@ -183,21 +183,21 @@ def site(folder: Path) -> Iterator[Page]:
         yield Page(f"site-{name.replace('/', '-')}", url, printed=False)
 
 
-def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
-    for name, make in reports(folder).items():
+def iter_pages(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
+    for name, make in report_makers(folder).items():
         if wanted(name):
             path = folder / f"{name}.html"
             path.write_text(make(), encoding="utf-8")
             yield Page(name, path.as_uri())
             if name in ("good", "disagreement"):
                 yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
-    for name, pages in (("fleet", fleet_pages), ("site", site)):
+    for name, pages in (("fleet", fleet_pages), ("site", site_pages)):
         if wanted(name):
             yield from pages(folder)
 
 
 @contextmanager
-def viewer(plays: bool = False) -> Iterator[Page]:
+def run_viewer(plays: bool = False) -> Iterator[Page]:
     from urdfkin.view.server import new_server
     from urdfkin.view.viewer import Viewer
 
@@ -217,7 +217,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
         server.stop()
 
 
-def load(browser: Browser, page: Page) -> None:
+def open_page(browser: Browser, page: Page) -> None:
     browser.chrome.get("about:blank")  # A change of the fragment alone does not reload a page.
     browser.chrome.get(page.url)
     if page.ready:
@@ -227,14 +227,14 @@ def load(browser: Browser, page: Page) -> None:
     browser.settle()
 
 
-def look(
+def check_screen(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
     where, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
     browser.errors()
-    load(browser, page)
+    open_page(browser, page)
     if (wide := browser.js("return document.documentElement.scrollWidth")) > width:
         faults.append(f"{wide} pixels wide")
     faults += [f"asks for {url}" for url in browser.requests() if not url.startswith(page.own)]
@@ -264,10 +264,10 @@ def look(
     return [f"{page.name}, {where}: {what}" for what in dict.fromkeys(faults)]
 
 
-def walk(browser: Browser, page: Page) -> list[str]:
+def check_keyboard(browser: Browser, page: Page) -> list[str]:
     faults, seen = list[str](), list[str]()
     browser.become(1280, 1000)
-    load(browser, page)
+    open_page(browser, page)
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
@@ -287,7 +287,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
     return [f"{page.name}, keyboard: {what}" for what in dict.fromkeys(faults)]
 
 
-def html_errors(page: Page, jar: Path) -> list[str]:
+def find_html_errors(page: Page, jar: Path) -> list[str]:
     path = page.url.removeprefix("file://")
     done = subprocess.run(
         ["java", "-Xss4m", "-jar", str(jar), "--format", "json", "--errors-only", path],
@@ -301,9 +301,9 @@ def html_errors(page: Page, jar: Path) -> list[str]:
     ]
 
 
-def as_pdf(browser: Browser, page: Page) -> bytes:
+def print_to_pdf(browser: Browser, page: Page) -> bytes:
     browser.become(1280, 1000)
-    load(browser, page)
+    open_page(browser, page)
     a4 = {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
     return base64.b64decode(browser.chrome.execute_cdp_cmd("Page.printToPDF", a4)["data"])
 
@@ -311,15 +311,15 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
     lines = list[str]()
     for width, dark in page.screens:
-        lines += look(browser, page, width, dark, axe, output)
+        lines += check_screen(browser, page, width, dark, axe, output)
     if not page.whole:
         return lines
-    lines += walk(browser, page)
+    lines += check_keyboard(browser, page)
     if jar is not None and page.url.startswith("file:") and not page.prepare:
-        lines += html_errors(page, jar)
+        lines += find_html_errors(page, jar)
     if output is not None and page.printed:
         pdf = output / f"{page.name}.pdf"
-        pdf.write_bytes(as_pdf(browser, page))
+        pdf.write_bytes(print_to_pdf(browser, page))
         if shutil.which("pdftoppm"):
             options = ["-r", "60", "-png", "-l", str(_PAGES)]
             command = ["pdftoppm", *options, str(pdf), str(output / f"{page.name}-print")]
@@ -332,32 +332,32 @@ def main() -> None:
     only = "pages to audit, by the beginnings of their names: good, same, fleet, site, viewer"
     parser.add_argument("--only", nargs="*", default=[""], help=only)
     parser.add_argument("--output", type=Path, help="folder for pictures and printed pages")
-    given = parser.parse_args()
-    axe, jar = axe_script(), html_checker()
-    if given.output is not None:
-        given.output.mkdir(parents=True, exist_ok=True)
+    arguments = parser.parse_args()
+    axe, jar = read_axe_script(), find_html_checker()
+    if arguments.output is not None:
+        arguments.output.mkdir(parents=True, exist_ok=True)
     print(f"axe: {axe.splitlines()[0] if axe else 'missing'}; HTML checker: {jar or 'missing'}")
     faults = list[str]()
 
-    def wanted(name: str) -> bool:
-        return name.startswith(tuple(given.only))
+    def is_selected(name: str) -> bool:
+        return name.startswith(tuple(arguments.only))
 
-    def visit(browser: Browser, page: Page) -> None:
+    def audit_page(browser: Browser, page: Page) -> None:
         # The site stores the theme of the first visit, so the stored theme is removed before each page.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
-        found = audit(browser, page, given.output, axe, jar)
+        found = audit(browser, page, arguments.output, axe, jar)
         faults.extend(found)
         print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
 
     with tempfile.TemporaryDirectory() as folder:
         with opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser:
-            for page in made(Path(folder), wanted):
-                visit(browser, page)
-        for plays in (False, True) if wanted("viewer") else ():
+            for page in iter_pages(Path(folder), is_selected):
+                audit_page(browser, page)
+        for plays in (False, True) if is_selected("viewer") else ():
             profile = Path(folder) / f"viewer-{plays}"
-            with opened(profile, flags=(_MOUSE,), draws=False) as browser, viewer(plays) as page:
-                visit(browser, page)
+            with opened(profile, flags=(_MOUSE,), draws=False) as browser, run_viewer(plays) as page:
+                audit_page(browser, page)
     print(f"{len(faults)} faults")
     sys.exit(bool(faults))
 

@@ -26,10 +26,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # Idle threads of PyTorch s
 
 from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
-from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
-from scripts.benchmarking.subject import QUANTITIES, SUBJECTS
-from scripts.benchmarking.tables import machine_of, tables
+from scripts.benchmarking.machine import USES, describe_machine, measure_first_uses, measure_memory
+from scripts.benchmarking.tables import format_machine, make_tables
 from scripts.benchmarking.timing import DifferenceError, Row
+from scripts.benchmarking.workload import QUANTITIES, ROBOT_FRAMES
 from urdfkin.compiled.preload import use_only
 from urdfkin.verify.oracles import versions
 
@@ -37,7 +37,7 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 
 @dataclass(frozen=True)
-class Plan:
+class BenchmarkSize:
     configurations: int = 100_000  # number of configurations of a batch
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
@@ -49,36 +49,43 @@ class Plan:
     memory: int = 1_000_000  # number of configurations for the measurement of memory
 
 
-QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
+QUICK = BenchmarkSize(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
 
 
-def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
+def measure_sections(
+    plan: BenchmarkSize, sections: Sequence[str], contenders: Sequence[Contender]
+) -> dict[str, Any]:
     """Measure everything; raise DifferenceError if two libraries have different results."""
-    name, frame = SUBJECTS[0]
+    name, frame = ROBOT_FRAMES[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
-        **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
+    rows: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
+        **{name: measured.contender_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),
         "sizes": measured.size_rows(plan.sizes, rounds),
     }
     found: dict[str, Any] = {
-        "machine": machine(),
+        "machine": describe_machine(),
         "versions": versions(),
-        "libraries": {contender.library: contender.state for contender in contenders},
+        "libraries": {contender.library: contender.version for contender in contenders},
         "rounds": rounds,
         "operations": dict(measured.operation_counts()),
-        "rows": [asdict(row) for section, way in ways.items() if section in sections for row in way],
+        "rows": [
+            asdict(row)
+            for section, section_rows in rows.items()
+            if section in sections
+            for row in section_rows
+        ],
         "memory": [
-            peak_over_output(name, frame, quantity, plan.memory, out=out)
+            measure_memory(name, frame, quantity, plan.memory, out=out)
             for quantity, out in product(QUANTITIES, (True, False) if "memory" in sections else ())
         ],
     }
     if "where" in sections:
-        single = measured.parts_of_calls(min(n, 2_000), rounds)
-        found["where"] = [*measured.parts_of_batches(n, rounds), *single]
+        single = measured.call_step_times(min(n, 2_000), rounds)
+        found["where"] = [*measured.batch_step_times(n, rounds), *single]
     if "first" in sections:
-        found["first"] = list(first_uses(name, frame, plan.first))
+        found["first"] = list(measure_first_uses(name, frame, plan.first))
     return found
 
 
@@ -90,21 +97,21 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--plot", type=Path, help="plot the measurements: svg, png or pdf")
     option("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
     option("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
-    given = parser.parse_args(words)
-    contenders = ALWAYS if given.no_peers else ALWAYS + PEERS
+    options = parser.parse_args(words)
+    contenders = ALWAYS if options.no_peers else ALWAYS + PEERS
     try:
         with use_only("compiled"):
-            figures = document(QUICK if given.quick else Plan(), given.only, contenders)
+            figures = measure_sections(QUICK if options.quick else BenchmarkSize(), options.only, contenders)
     except DifferenceError as difference:
         print(f"results differ: {difference}", file=sys.stderr)
         return 1
-    print(machine_of(figures), *(table.text for table in tables(figures)), sep="\n\n")
-    if given.json:
-        given.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
-    if given.plot:
+    print(format_machine(figures), *(table.text for table in make_tables(figures)), sep="\n\n")
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
+    if options.plot:
         from scripts.benchmarking.picture import draw
 
-        given.plot.write_bytes(draw(figures, given.plot))
+        options.plot.write_bytes(draw(figures, options.plot))
     return 0
 
 

@@ -36,7 +36,7 @@ from typing import Any
 import numpy as np
 
 import urdfkin
-from scripts.benchmarking.contenders import positions
+from scripts.benchmarking.contenders import find_indices
 from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import FrameCode
@@ -57,13 +57,13 @@ _MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\",
                 seconds([&] { return @title@_kinematics::@name@_batch<T>(n, @given@, out); }));"""
 
 
-def nvcc() -> str | None:
+def find_nvcc() -> str | None:
     packages = Path(sysconfig.get_path("purelib"), "nvidia").glob("cu*/bin/nvcc")
     made = Path(sys.prefix, "nvcc", "bin")
     return shutil.which("nvcc") or shutil.which("nvcc", path=made) or next(map(str, sorted(packages)), None)
 
 
-def gpus() -> int:
+def count_gpus() -> int:
     try:
         driver, count = ctypes.CDLL("libcuda.so.1"), ctypes.c_int(0)
     except OSError:
@@ -72,21 +72,21 @@ def gpus() -> int:
     return count.value if found else 0
 
 
-def bytes_of(code: FrameCode, function: Function, real: str) -> int:
+def bytes_per_configuration(code: FrameCode, function: Function, real: str) -> int:
     return _BYTES[real] * (sum(code.widths(function).values()) + len(function.results))
 
 
-def program(code: FrameCode) -> str:
+def make_program(code: FrameCode) -> str:
 
-    def filled(text: str, **values: object) -> str:
+    def fill(text: str, **values: object) -> str:
         for name, value in values.items():
             text = text.replace(f"@{name}@", str(value))
         return text
 
     measured = "\n".join(
-        filled(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
+        fill(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
     )
-    return filled(
+    return fill(
         _PROGRAM.read_text("utf-8").partition("\n")[2],
         UP=code.name.upper(),
         file=f"{code.name}.cuh",
@@ -99,12 +99,12 @@ def program(code: FrameCode) -> str:
     )
 
 
-def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
+def compile_programs(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
     header, source = folder / f"{code.name}.cuh", folder / "measure.cu"
     header.write_text(write(code, "cuda"), encoding="utf-8")
-    source.write_text(program(code), encoding="utf-8")
+    source.write_text(make_program(code), encoding="utf-8")
     libraries = Path(compiler).resolve().parents[1] / "lib"
-    arch = ["-arch=native"] if gpus() else []
+    arch = ["-arch=native"] if count_gpus() else []
     command = [compiler, "-O3", "-std=c++17", *arch, f"-I{folder}", f"-L{libraries}", "-x", "cu"]
     up, found = code.name.upper(), {"measure": folder / "measure"}
     subprocess.run([*command, str(source), "-o", str(found["measure"])], check=True)
@@ -115,18 +115,18 @@ def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
     return found
 
 
-def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+def make_rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
         raise ValueError("the compiled program did not print the bandwidth of the GPU's memory")
     functions = {f.name: f for f in code.functions}
     for row in found[1:]:
         a_second = row["n"] / row["s"]
-        moved = bytes_of(code, functions[row["quantity"]], row["real"])
+        moved = bytes_per_configuration(code, functions[row["quantity"]], row["real"])
         yield {**row, "a_second": a_second, "share": a_second * moved / found[0]["bandwidth"]}
 
 
-def table(measured: Iterable[dict[str, Any]]) -> str:
+def make_table(measured: Iterable[dict[str, Any]]) -> str:
     heads = ("by", "quantity", "precision", "batch", "configurations/s", "share of bandwidth")
     rows = [
         (x["by"], x["quantity"], x["real"], f"{x['n']:,}", f"{x['a_second']:.3g}", f"{x['share']:.1%}")
@@ -135,7 +135,7 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
     return markdown(heads, rows, left=3)
 
 
-def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
+def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
     """Yield a JSON line for each measurement with PyTorch; raise ValueError for a wrong result."""
     try:
         import torch
@@ -152,20 +152,20 @@ def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") ->
         )
     for function in code.functions:
         call = scope[function.name]
-        ways: dict[str, Callable[..., Any]] = {"PyTorch": call, "torch.compile": torch.compile(call)}
+        callables: dict[str, Callable[..., Any]] = {"PyTorch": call, "torch.compile": torch.compile(call)}
         if function.name == "jacobian" and importlib.util.find_spec("pytorch_kinematics"):
-            ways["PyTorch Kinematics"] = _chain(robot, frame, device)
-        for by, real, n in product(ways, _BYTES, SIZES):
+            callables["PyTorch Kinematics"] = _pytorch_kinematics_jacobian(robot, frame, device)
+        for by, real, n in product(callables, _BYTES, SIZES):
             kind = {"dtype": getattr(torch, real), "device": device}
             names: dict[str, Any] = {
-                "call": ways[by],
+                "call": callables[by],
                 "inputs": [torch.rand((n, width), **kind) for width in code.widths(function).values()],
             }
             found = Timer("call(*inputs)", globals=names).blocked_autorange().median
             yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": found})
 
 
-def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
+def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
 
     Raise ValueError if its Jacobian differs from the Jacobian that `robot` computes.
@@ -177,7 +177,7 @@ def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     names = chain.get_joint_parameter_names()
     if not set(names) <= set(robot.joint_names):
         raise ValueError(f"PyTorch Kinematics has other joints: {', '.join(names)}")
-    columns, chains, q = positions(robot.joint_names, names), {}, robot.sample(16, seed=0)
+    columns, chains, q = find_indices(robot.joint_names, names), {}, robot.sample(16, seed=0)
     for real, most in _MOST.items():
         kind = getattr(torch, real)
         chains[kind] = copy.deepcopy(chain).to(dtype=kind, device=device)
@@ -194,41 +194,43 @@ def main(words: list[str] | None = None) -> int:
     option("--frame", help="link or joint; the default is the robot's tip")
     option("--json", type=Path, help="file for the measurements, one per line")
     option("--compile-only", action="store_true", help="compile the programs, and run none")
-    given = parser.parse_args(words)
-    if (compiler := nvcc()) is None:
-        return _failed("nvcc is not installed. Install CUDA, or run `make nvcc`.")
-    if not given.compile_only and not gpus():
-        return _failed("CUDA's driver finds no GPU here. Use a machine with a GPU, or --compile-only.")
-    robot = urdfkin.load(given.robot)
-    frame = given.frame or robot.tip_frame
+    options = parser.parse_args(words)
+    if (compiler := find_nvcc()) is None:
+        return _report_failure("nvcc is not installed. Install CUDA, or run `make nvcc`.")
+    if not options.compile_only and not count_gpus():
+        return _report_failure(
+            "CUDA's driver finds no GPU here. Use a machine with a GPU, or --compile-only."
+        )
+    robot = urdfkin.load(options.robot)
+    frame = options.frame or robot.tip_frame
     code = make_robot_code(robot, frame, QUANTITIES, "local_world_aligned")
     with tempfile.TemporaryDirectory() as folder:
         try:
-            programs = compiled(code, Path(folder), compiler)
+            programs = compile_programs(code, Path(folder), compiler)
         except subprocess.CalledProcessError as error:
-            return _failed(f"the program does not compile: {compiler} exits with {error.returncode}.")
-        if given.compile_only:
+            return _report_failure(f"the program does not compile: {compiler} exits with {error.returncode}.")
+        if options.compile_only:
             print(f"compiled, not run: {', '.join(programs)}")
             return 0
         for real in _BYTES:
             done = subprocess.run([str(programs[real])], capture_output=True, text=True, check=False)
             print(done.stdout, end="")
             if done.returncode or done.stdout.count(" on the GPU") != len(code.functions):
-                return _failed(f"the check in {real} precision failed on the GPU: {done.stderr}", 1)
+                return _report_failure(f"the check in {real} precision failed on the GPU: {done.stderr}", 1)
         lines = subprocess.run([str(programs["measure"])], capture_output=True, text=True, check=True).stdout
     found, status = lines.splitlines(), 0
     try:
-        found.extend(of_torch(robot, frame, code))
+        found.extend(measure_torch(robot, frame, code))
     except ValueError as error:
-        status = _failed(str(error), 1)
-    measured = list(rows(code, found))
-    print(table(measured))
-    if given.json:
-        given.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
+        status = _report_failure(str(error), 1)
+    measured = list(make_rows(code, found))
+    print(make_table(measured))
+    if options.json:
+        options.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
     return status
 
 
-def _failed(reason: str, status: int = 2) -> int:
+def _report_failure(reason: str, status: int = 2) -> int:
     print(f"benchmark_gpu.py: {reason}", file=sys.stderr)
     return status
 

@@ -24,7 +24,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 
 
-def version() -> str:
+def read_version() -> str:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return str(project["version"])
 
@@ -76,8 +76,8 @@ def main() -> None:
     parser.add_argument("--tag", help="tag of the release, such as v0.1.0")
     parser.add_argument("--sbom-of", metavar="PYTHON", help="list the packages of this Python environment")
     options = parser.parse_args()
-    if options.tag not in (None, f"v{version()}"):
-        sys.exit(f"the tag is {options.tag}, and pyproject.toml has version {version()}")
+    if options.tag not in (None, f"v{read_version()}"):
+        sys.exit(f"the tag is {options.tag}, and pyproject.toml has version {read_version()}")
     options.folder.mkdir(parents=True, exist_ok=True)
     if any(options.folder.iterdir()):
         sys.exit(f"{options.folder} is not empty; name a new folder")
@@ -86,7 +86,7 @@ def main() -> None:
     _run(sys.executable, "-m", "twine", "check", "--strict", *files)
     # W002 (equal files): the wheel has the licence of three.js twice, in the package and with the licences.
     _run(sys.executable, "-m", "check_wheel_contents", "--ignore", "W002", files[1])
-    sbom = options.folder / f"urdfkin-{version()}.cdx.json"
+    sbom = options.folder / f"urdfkin-{read_version()}.cdx.json"
     write_sbom(files[1], sbom.resolve(), options.sbom_of)
     lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in (*files, sbom)]
     (options.folder / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")

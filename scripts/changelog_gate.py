@@ -16,49 +16,49 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PAGE = "CHANGELOG.md"
-_ARGUED = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
+_NO_CHANGELOG = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
-class CannotTellError(Exception):
+class NoBaseError(Exception):
     """The branch cannot be compared with main; the message states the reason."""
 
 
-def git(root: Path, *words: str) -> str:
+def run_git(root: Path, *words: str) -> str:
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True)
     except FileNotFoundError:
-        raise CannotTellError("git is not installed") from None
+        raise NoBaseError("git is not installed") from None
     except subprocess.CalledProcessError as error:
-        raise CannotTellError((error.stderr.strip().splitlines() or ["git has no message"])[-1]) from None
+        raise NoBaseError((error.stderr.strip().splitlines() or ["git has no message"])[-1]) from None
     return done.stdout
 
 
-def left_main(root: Path) -> str:
+def find_branch_point(root: Path) -> str:
     """Return the commit at which HEAD left main."""
-    head = git(root, "rev-parse", "HEAD").strip()
+    head = run_git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
         try:
-            base = git(root, "merge-base", "HEAD", main).strip()
-        except CannotTellError:
+            base = run_git(root, "merge-base", "HEAD", main).strip()
+        except NoBaseError:
             continue
         if base != head:
             return base
-    raise CannotTellError("HEAD is on main, or main is not in this clone")
+    raise NoBaseError("HEAD is on main, or main is not in this clone")
 
 
 def main(root: Path = ROOT, base: str | None = None) -> int:
     try:
-        base = base or left_main(root)
-        entries = git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")
-        messages = git(root, "log", "--format=%B", f"{base}..HEAD")
-    except CannotTellError as error:
+        base = base or find_branch_point(root)
+        entries = run_git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")
+        messages = run_git(root, "log", "--format=%B", f"{base}..HEAD")
+    except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
     # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
     found = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in found if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))
-    if not package or PAGE in changed or _ARGUED.search(messages):
+    if not package or PAGE in changed or _NO_CHANGELOG.search(messages):
         return 0
     more = f" and {len(package) - 1} more" if len(package) > 1 else ""
     print(

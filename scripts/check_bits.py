@@ -44,16 +44,16 @@ LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Numbers of configurations and of frames whose results are stored.
-KEPT, FRAMES = 9, 6
+STORED, STORED_FRAMES = 9, 6
 #: Index of the configuration that is computed in plain Python and by kernels.
-INTERPRETED = 3
-WAYS: tuple[ComputeMode, ...] = ("interpreted", "compiled")
+INTERPRETED_INDEX = 3
+MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
 Arrays = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Subject:
+class RobotInputs:
     """A robot, its inputs and its frames: the tip, and some frames of the whole tree."""
 
     name: str
@@ -62,7 +62,7 @@ class Subject:
     frames: tuple[str, ...]
 
     @classmethod
-    def of(cls, name: str, stored: Arrays | None = None) -> Self:
+    def load(cls, name: str, stored: Arrays | None = None) -> Self:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hide warnings about the robot's file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
@@ -71,17 +71,17 @@ class Subject:
             return cls(name, robot, inputs, tuple(stored[f"{name}/frames"].tolist()))
         n = max(LENGTHS)
         v, a = np.random.default_rng(0).standard_normal((2, n, robot.nv))
-        evenly = {int(i) for i in np.linspace(0, len(robot.link_names) - 1, FRAMES - 1)}
+        evenly = {int(i) for i in np.linspace(0, len(robot.link_names) - 1, STORED_FRAMES - 1)}
         links = [f"link:{robot.link_names[i]}" for i in sorted(evenly)]
         return cls(name, robot, (robot.sample(n), v, a), (robot.tip_frame, *links))
 
-    def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
+    def calls(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
         for quantity in recursive_quantities():
             for reference in Reference if quantity.has_reference else (Reference.LOCAL_WORLD_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
                 yield what, quantity, reference, self.inputs[: len(quantity.inputs)]
 
-    def computed(
+    def compute(
         self,
         quantity: Quantity,
         reference: Reference,
@@ -95,19 +95,19 @@ class Subject:
         return result
 
 
-def same(x: FloatArray, y: FloatArray) -> bool:
+def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
     return x.shape == y.shape and x.tobytes() == y.tobytes()
 
 
-def differing(subject: Subject, now: Arrays) -> Iterator[str]:
+def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
     """Yield results of batches and prepared evaluators that differ from single calls."""
     frame = subject.frames[0]
-    for what, quantity, reference, inputs in subject.results():
-        few = [x[:KEPT] for x in inputs]
-        if not same(subject.computed(quantity, reference, subject.frames, few), now[what]):
+    for what, quantity, reference, inputs in subject.calls():
+        few = [x[:STORED] for x in inputs]
+        if not have_equal_bits(subject.compute(quantity, reference, subject.frames, few), now[what]):
             yield f"{what}: several frames in one pass"
         rows = list(zip(*inputs, strict=True))
-        single = np.stack([subject.computed(quantity, reference, frame, row) for row in rows])
+        single = np.stack([subject.compute(quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
             yield f"{what}: a result is not finite"
         fast = getattr(subject.robot.prepare(frame, reference), quantity.method, None)
@@ -115,36 +115,36 @@ def differing(subject: Subject, now: Arrays) -> Iterator[str]:
             out = np.empty_like(single)
             for row, place in zip(rows, out, strict=True):
                 fast(*row, out=place)
-            if not same(single, out):
+            if not have_equal_bits(single, out):
                 yield f"{what}: prepared"
         for n, threads in product(LENGTHS, THREADS):
             for first in {0, min(5, len(rows) - n)}:
                 part = [x[first : first + n] for x in inputs]
-                batch = subject.computed(quantity, reference, frame, part, threads)
+                batch = subject.compute(quantity, reference, frame, part, threads)
                 for k in range(n):
-                    if not same(batch[k], single[first + k]):
+                    if not have_equal_bits(batch[k], single[first + k]):
                         yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
 
 
-def differing_interpreted(subject: Subject) -> Iterator[str]:
-    for what, quantity, reference, inputs in subject.results():
-        row, found = [x[INTERPRETED] for x in inputs], []
-        for way in WAYS:
+def find_interpreted_differences(subject: RobotInputs) -> Iterator[str]:
+    for what, quantity, reference, inputs in subject.calls():
+        row, found = [x[INTERPRETED_INDEX] for x in inputs], []
+        for way in MODES:
             with use_only(way):
-                found.append(subject.computed(quantity, reference, subject.frames, row))
-        if not same(*found):
+                found.append(subject.compute(quantity, reference, subject.frames, row))
+        if not have_equal_bits(*found):
             yield f"{what}: interpreted"
 
 
-def to_keep(subject: Subject) -> dict[str, Any]:
+def compute_stored_results(subject: RobotInputs) -> dict[str, Any]:
     stored: dict[str, Any] = {f"{subject.name}/{x}": y for x, y in zip("qva", subject.inputs, strict=True)}
     stored[f"{subject.name}/frames"] = np.array(subject.frames)
-    for what, quantity, reference, inputs in subject.results():
-        few = [x[:KEPT] for x in inputs]
-        parts = [subject.computed(quantity, reference, frame, few) for frame in subject.frames]
+    for what, quantity, reference, inputs in subject.calls():
+        few = [x[:STORED] for x in inputs]
+        parts = [subject.compute(quantity, reference, frame, few) for frame in subject.frames]
         stored[what] = results = np.stack(parts, axis=1)
         call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
-        bound = compute_bound(quantity, call.select(slice(0, KEPT)))
+        bound = compute_bound(quantity, call.select(slice(0, STORED)))
         limit = np.broadcast_to(EPS * bound.k * bound.scale, results.shape)
         stored[f"{what}/bound"] = limit.astype(np.float32)
     return stored
@@ -158,9 +158,9 @@ def digest(now: Arrays) -> str:
     return whole.hexdigest()[:16]
 
 
-def share(what: str, now: Arrays, stored: Arrays) -> float:
+def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
     """Return the difference from the stored result as a fraction of the stored bound."""
-    if same(now[what], stored[what]):
+    if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -169,8 +169,8 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 
-def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
+def compare_with_stored(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
+    shares = {what: difference_ratio(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:
         return "equal", 0.0
@@ -189,23 +189,23 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--write", type=Path, help="store the results in this file (.npz)")
     option("--against", type=Path, help="compare the results with those in this file")
     option("--within", type=float, default=0.0, help="allowed difference, as a fraction of the bound")
-    given = parser.parse_args(words)
-    before = None if given.against is None else np.load(given.against)
+    options = parser.parse_args(words)
+    before = None if options.against is None else np.load(options.against)
     known = catalogue() if before is None else dict.fromkeys(name.partition("/")[0] for name in before)
     everything, wrong = dict[str, Any](), 0
-    for name in given.robots or known:
-        subject = Subject.of(name, before)
+    for name in options.robots or known:
+        subject = RobotInputs.load(name, before)
         with use_only("compiled"):
-            now = to_keep(subject)
-            found = list(differing(subject, now))
-        found += differing_interpreted(subject)
+            now = compute_stored_results(subject)
+            found = list(find_differences(subject, now))
+        found += find_interpreted_differences(subject)
         everything |= now
-        said, most = ("", 0.0) if before is None else compared(name, now, before)
+        said, most = ("", 0.0) if before is None else compare_with_stored(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
-        wrong += bool(found) or most > given.within
+        wrong += bool(found) or most > options.within
     print(f"{'all robots':28} {digest(everything)} {wrong} wrong")
-    if given.write is not None:
-        np.savez_compressed(given.write, **everything)
+    if options.write is not None:
+        np.savez_compressed(options.write, **everything)
     return int(wrong > 0)
 
 

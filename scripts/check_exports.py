@@ -1,8 +1,8 @@
 """Export example-robot-data's leaf frames to C, NumPy and arrays, compile the C code, run the test vectors.
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
-    python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only
-    python scripts/check_exports.py --ways sympy-exact --keep exact.jsonl  # in exact numbers
+    python scripts/check_exports.py --languages array --keep array.jsonl  # every leaf, in some languages only
+    python scripts/check_exports.py --languages sympy-exact --keep exact.jsonl  # in exact numbers
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
     python scripts/check_exports.py --library torch --environment /tmp/torch  # the tips, in PyTorch
@@ -35,8 +35,8 @@ from pathlib import Path
 from typing import Any
 
 import urdfkin
-from scripts.benchmarking.subject import chain_urdf
-from scripts.pages import DOCS, inserted, table
+from scripts.benchmarking.workload import chain_urdf
+from scripts.pages import DOCS, insert_parts, table
 from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
 from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import make_robot_code
@@ -47,24 +47,24 @@ PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
 #: Compiled languages, each with its suffix, compilers and options.
 _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])))
-_WAYS = ("c", "cuda", "numpy", "array")
-#: Languages that are checked only if `--ways` names them.
-_NAMED = ("sympy-exact",)
+_DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
+#: Languages that are checked only if `--languages` names them.
+_OTHER_LANGUAGES = ("sympy-exact",)
 #: A PyTorch or JAX file contains a Hessian up to this number of joint velocities, because the check is slow.
 #: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
-_HESSIANS = 16
-_SHARE = re.compile(r"worst error (\S+) of the bound")
+_MAX_HESSIAN = 16
+_ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 
 
-def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
+def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
     return make_robot_code(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
-def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Yield, for each way to run the code, the largest error as a fraction of its bound."""
+def error_ratios(written: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
+    """Yield the name of each compiled or Python program, and the largest error as a fraction of its bound."""
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", written.name.upper()
-        for compiler in filter(shutil.which, compilers if to in ways else ()):
+        for compiler in filter(shutil.which, compilers if to in languages else ()):
             source.write_text(write(written, to), encoding="utf-8")
             for real in ("double", "float"):
                 program = folder / f"{compiler}_{real}"
@@ -72,9 +72,9 @@ def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[
                 command = [compiler, *strict, *macros, str(source), "-o", str(program), "-lm"]
                 subprocess.run(command, check=True)
                 done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
-                found = [float(share) for share in _SHARE.findall(done.stdout)]
-                yield f"{compiler} {real}", _largest(found, len(written.functions))
-    for to in sorted({"numpy", "array", "sympy-exact"} & set(ways)):
+                found = [float(share) for share in _ERROR_RATIO.findall(done.stdout)]
+                yield f"{compiler} {real}", _largest_ratio(found, len(written.functions))
+    for to in sorted({"numpy", "array", "sympy-exact"} & set(languages)):
         scope: dict[str, Any] = {"__name__": "robot"}
         own = code_in(written, to)
         if not own.proof.certificate.verified:
@@ -83,15 +83,15 @@ def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[
         checked: dict[tuple[str, str], float] = scope["check"]()
         for kind in {kind for _, kind in checked}:
             found = [share for (_, of), share in checked.items() if of == kind]
-            yield f"{to} {kind}", _largest(found, len(written.functions))
+            yield f"{to} {kind}", _largest_ratio(found, len(written.functions))
 
 
-def _largest(found: Sequence[float], count: int) -> float:
+def _largest_ratio(found: Sequence[float], count: int) -> float:
     """Return the largest ratio of an error to its bound; NaN if one is NaN or one is missing."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
-def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
+def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield the tip frame of each robot, then other leaf links in a fixed random order."""
     robots = {name: urdfkin.load(name) for name in example_robots()}
     for name, robot in robots.items():
@@ -106,20 +106,20 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     yield from frames
 
 
-def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
+def check_frame(robot: Robot, frame: str, languages: Collection[str]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
-        written = code(robot, frame, QUANTITIES if robot.nv else ("placement",))
-        found = dict(shares(written, Path(folder), ways))
+        written = make_code(robot, frame, QUANTITIES if robot.nv else ("placement",))
+        found = dict(error_ratios(written, Path(folder), languages))
     good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
     return {"good": good, **found}
 
 
-def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
-    lines = lines_of(keep)
+def check_leaves(tips: bool, keep: Path | None, languages: Collection[str]) -> int:
+    lines = read_lines(keep)
     stored = {(line["robot"], line["frame"]) for line in lines}
-    for name, robot, frame in subjects(tips):
+    for name, robot, frame in leaf_frames(tips):
         if (name, frame) not in stored:
-            lines.append({"robot": name, "frame": frame, **found_of(robot, frame, ways)})
+            lines.append({"robot": name, "frame": frame, **check_frame(robot, frame, languages)})
             store(keep, json.dumps(lines[-1]))
     wrong = [line for line in lines if not line["good"]]
     for line in wrong:
@@ -130,7 +130,7 @@ def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
     counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
     others = f"{len(found - leaves)} tips that are not leaves"
     print(f"{counts}, {others}; {len(wrong)} outside the bound or unverified")
-    tell(lines)
+    print_worst_errors(lines)
     return bool(wrong)
 
 
@@ -142,9 +142,9 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
         subprocess.run([str(python), "-m", "pip", "install", "--quiet", "numpy", *packages], check=True)
     version = [str(python), "-c", f"import {library}; print('{library}', {library}.__version__)"]
     print(subprocess.run(version, capture_output=True, text=True, check=True).stdout.strip(), flush=True)
-    stored = [line for line in lines_of(keep) if line["library"] == library]
+    stored = [line for line in read_lines(keep) if line["library"] == library]
     with tempfile.TemporaryDirectory() as folder:
-        paths = list(_files(library, Path(folder)))
+        paths = list(_write_files(library, Path(folder)))
         left = [path for path in paths if path.stem not in {line["file"] for line in stored}]
         command = [str(python), str(Path(__file__).with_name("run_exported.py")), library, *map(str, left)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
@@ -153,24 +153,24 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
                 store(keep, line.rstrip())
     wrong = sum(not all(x <= 1.0 for x in line.values() if isinstance(x, float)) for line in stored)
     print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound")
-    tell(stored)
+    print_worst_errors(stored)
     return int(wrong > 0 or len(stored) < len(paths) or process.returncode != 0)
 
 
-def _files(library: str, folder: Path) -> Iterator[Path]:
+def _write_files(library: str, folder: Path) -> Iterator[Path]:
     """Yield files with the code of each robot's tip frame, in a library's format and in `array`."""
-    for number, (_, robot, frame) in enumerate(subjects(tips=True)):
+    for number, (_, robot, frame) in enumerate(leaf_frames(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
         for to in (library, "array"):
-            hessian = differentiable and (robot.nv <= _HESSIANS if to == library else library == "torch")
-            written = code(robot, frame, (*wanted, "hessian") if hessian else wanted)
+            hessian = differentiable and (robot.nv <= _MAX_HESSIAN if to == library else library == "torch")
+            written = make_code(robot, frame, (*wanted, "hessian") if hessian else wanted)
             path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
             path.write_text(write(written, to), encoding="utf-8")
             yield path
 
 
-def lines_of(keep: Path | None) -> list[dict[str, Any]]:
+def read_lines(keep: Path | None) -> list[dict[str, Any]]:
     if keep is None or not keep.exists():
         return []
     return [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()]
@@ -183,18 +183,18 @@ def store(keep: Path | None, line: str) -> None:
             print(line, file=file)
 
 
-def tell(lines: Sequence[dict[str, Any]]) -> None:
+def print_worst_errors(lines: Sequence[dict[str, Any]]) -> None:
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
     print(f"worst error as a share of the bound: {worst}")
 
 
-def page(text: str) -> str:
+def make_page(text: str) -> str:
     rows = []
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
     for (source, frame), quantity in product(frames, QUANTITIES):
         robot = urdfkin.load(source)
-        written = code(robot, frame, (quantity,))
+        written = make_code(robot, frame, (quantity,))
         lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
         sizes = (
             f"{written.functions[0].operation_count:,}",
@@ -203,7 +203,7 @@ def page(text: str) -> str:
         )
         rows.append((f"{robot.name}, {frame}", quantity, *sizes))
     heads = ("robot, frame", "quantity", "operations", "lines of C", "kB")
-    return inserted(text, sizes=table(heads, rows, left=2))
+    return insert_parts(text, sizes=table(heads, rows, left=2))
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -212,7 +212,13 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")
     option("--tips", action="store_true", help="check only one leaf link of each robot")
     option("--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md")
-    option("--ways", nargs="+", choices=(*_WAYS, *_NAMED), default=_WAYS, help="only these languages")
+    option(
+        "--languages",
+        nargs="+",
+        choices=(*_DEFAULT_LANGUAGES, *_OTHER_LANGUAGES),
+        default=_DEFAULT_LANGUAGES,
+        help="only these languages",
+    )
     option("--library", choices=("torch", "jax"), help="check the tips in this library")
     option("--environment", type=Path, help="folder of the library's virtual environment")
     option("--package", help="what pip installs, for example torch==2.13.0+cpu")
@@ -223,10 +229,10 @@ def main(words: Sequence[str] | None = None) -> int:
     if arguments.library:
         return check_library(arguments.library, arguments.environment, arguments.package, arguments.keep)
     if arguments.sizes:
-        PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
+        PAGE.write_text(make_page(PAGE.read_text("utf-8")), "utf-8")
         print(PAGE)
         return 0
-    return check(arguments.tips, arguments.keep, arguments.ways)
+    return check_leaves(arguments.tips, arguments.keep, arguments.languages)
 
 
 if __name__ == "__main__":

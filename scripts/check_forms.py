@@ -45,7 +45,7 @@ from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
-FEW, SMALL = 6, 4
+MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the program that Octave runs, for each format.
 _FIRST = {
@@ -59,7 +59,7 @@ _DOCUMENT = r"""\documentclass{article}
 """
 
 
-class Missing(Exception):  # noqa: N818  only this format is skipped
+class MissingProgramError(Exception):
     """An interpreter or a library of a format is not installed."""
 
 
@@ -68,7 +68,7 @@ class Job:
     table: DHTable
     q: FloatArray
 
-    def given(self, form: str) -> list[list[float]]:
+    def coordinates(self, form: str) -> list[list[float]]:
         if form not in LANGUAGES or form == "sympy":
             return list(self.q.tolist())
         names = coordinate_names(to_tree(self.table))
@@ -80,23 +80,25 @@ Poses = list[FloatArray]
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
-def in_python(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+def run_in_python(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     library = form if form != "ets" else "roboticstoolbox"
     if importlib.util.find_spec(library) is None:
-        raise Missing(library)
-    return [np.array(poses.poses(form, export(job.table, form), job.given(form))) for job in jobs]
+        raise MissingProgramError(library)
+    return [
+        np.array(poses.compute_poses(form, export(job.table, form), job.coordinates(form))) for job in jobs
+    ]
 
 
-def elsewhere(form: str, interpreter: str, jobs: Sequence[Job], folder: Path) -> Poses:
-    given, found = folder / "jobs.json", folder / "poses.json"
+def run_in_other_python(form: str, interpreter: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    jobs_file, poses_file = folder / "jobs.json", folder / "poses.json"
     data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
-    given.write_text(json.dumps(data), "utf-8")
-    subprocess.run([interpreter, poses.__file__, str(given), str(found)], check=True)
-    return [np.array(one) for one in json.loads(found.read_text("utf-8"))]
+    jobs_file.write_text(json.dumps(data), "utf-8")
+    subprocess.run([interpreter, poses.__file__, str(jobs_file), str(poses_file)], check=True)
+    return [np.array(one) for one in json.loads(poses_file.read_text("utf-8"))]
 
 
-def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
-    compiler, found = _program("cc"), Poses()
+def run_in_c(jobs: Sequence[Job], folder: Path) -> Poses:
+    compiler, found = _find_program("cc"), Poses()
     for k, job in enumerate(jobs):
         text, library = export(job.table, "c"), folder / f"code{k}.so"
         name = re.findall(r"^void (\w+_placement)\(", text, re.MULTILINE)[0]
@@ -104,21 +106,21 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
         command = [compiler, *_STRICT, "-shared", "-fPIC", "code.c", "-o", str(library), "-lm"]
         subprocess.run(command, cwd=folder, check=True)
         place = ctypes.CDLL(str(library))[name]
-        given, T = np.array(job.given("c")), np.empty((len(job.q), 4, 4))
+        given, T = np.array(job.coordinates("c")), np.empty((len(job.q), 4, 4))
         for q, out in zip(given, T, strict=True):
             place(ctypes.c_void_p(q.ctypes.data), ctypes.c_void_p(out.ctypes.data))
         found.append(T)
     return found
 
 
-def in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
-    octave, lines = _program("octave-cli"), [_FIRST.get(form, "")]
+def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    octave, lines = _find_program("octave-cli"), [_FIRST.get(form, "")]
     for k, job in enumerate(jobs):
         text = export(replace(job.table, robot=f"t{k}"), form)
         name = re.findall(r"^function .*= (\w+)\(", text, re.MULTILINE)[0]
         (folder / f"{name}.m").write_text(text, "utf-8")
         lines.append(f"{'[f, x]' if form == 'matlab-symbolic' else 'f'} = {name}();")
-        for q in job.given(form):
+        for q in job.coordinates(form):
             numbers, tip = "; ".join(map(repr, q)), f"{sanitize(job.table.tip_frame)}_tip"
             exact = "; ".join(f"vpa('{x!r}')" for x in q)
             value = {
@@ -132,13 +134,13 @@ def in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     command = [octave, "--no-init-file", "--quiet", "tables.m"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if done.stdout.startswith("missing"):
-        raise Missing("Octave's package symbolic")
+        raise MissingProgramError("Octave's package symbolic")
     # Octave's package also prints the version of Python that it found.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
 
-def read_back(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+def read_written_table(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     found, file = Poses(), folder / f"table.{form}"
     for job in jobs:
         file.write_text(export(job.table, form), "utf-8")
@@ -146,7 +148,7 @@ def read_back(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     return found
 
 
-def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
+def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
@@ -159,18 +161,18 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 RUN: dict[str, Run] = {
-    **{form: partial(in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
-    "c": in_c,
+    **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
+    "c": run_in_c,
     # Octave uses substitutes for the toolbox's classes; `matlab-rst` has not been run in MATLAB.
-    **{form: partial(in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
-    **{form: partial(read_back, form) for form in ("toml", "json", "csv")},
-    "urdf": as_urdf,
+    **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
+    **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
+    "urdf": load_as_urdf,
 }
 
 
-def too_wide(tables: Sequence[str], folder: Path) -> list[float]:
+def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
     """Return the excess width (points) of each LaTeX table on the page of an `article`."""
-    latex = _program("pdflatex")
+    latex = _find_program("pdflatex")
     marked = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked) + "\\end{document}\n", "utf-8")
     command = [latex, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"]
@@ -183,51 +185,51 @@ def too_wide(tables: Sequence[str], folder: Path) -> list[float]:
     return [max(map(float, found), default=0.0) for found in over]
 
 
-def _program(name: str) -> str:
+def _find_program(name: str) -> str:
     if (found := shutil.which(name)) is None:
-        raise Missing(name)
+        raise MissingProgramError(name)
     return found
 
 
 @dataclass(frozen=True, slots=True)
-class Subject:
+class Case:
     """A table, some configurations, and Pinocchio's poses of the table's tip in the table's base."""
 
     name: str
     job: Job
-    theirs: FloatArray
+    pinocchio_poses: FloatArray
 
     @property
     def table(self) -> DHTable:
         return self.job.table
 
-    def off(self, found: FloatArray) -> tuple[float, float]:
+    def measure_errors(self, found: FloatArray) -> tuple[float, float]:
         """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # Even if all lengths of a table are zero, its angles have rounding errors.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )
-        return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
+        return float(np.abs(found - self.pinocchio_poses)[:, :3, 3].max()), float((apart / allowed).max())
 
 
-def subjects(leaves: bool) -> Iterator[Subject]:
+def make_cases(leaves: bool) -> Iterator[Case]:
     for name in example_robots():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
         for tip in tips:
             for convention in ("standard", "modified"):
-                yield subject(robot, f"{name} {tip} {convention}", robot.dh(tip, convention=convention))
+                yield make_case(robot, f"{name} {tip} {convention}", robot.dh(tip, convention=convention))
 
 
-def subject(robot: Robot, name: str, table: DHTable) -> Subject:
+def make_case(robot: Robot, name: str, table: DHTable) -> Case:
     q = sample(robot.tree, SAMPLES, np.random.default_rng(0))
     ends = [table.base_frame, table.tip_frame]
     base, tip = np.moveaxis(robot.verifier.oracle().placements(QueryBatch(ends, (q,))), 1, 0)
-    return Subject(name, Job(table, table.coupling.select(robot.tree, q)), np.linalg.inv(base) @ tip)
+    return Case(name, Job(table, table.coupling.select(robot.tree, q)), np.linalg.inv(base) @ tip)
 
 
-def fits(form: str, table: DHTable) -> bool:
+def can_represent(form: str, table: DHTable) -> bool:
     """Return whether a format can represent the table."""
     if form in LANGUAGES:
         return True
@@ -244,20 +246,24 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--toolbox", metavar="PYTHON", help="Python interpreter that has roboticstoolbox")
     forms = (*RUN, "latex")
     parser.add_argument("--forms", nargs="+", choices=forms, default=forms, metavar="FORM")
-    given = parser.parse_args(words)
+    options = parser.parse_args(words)
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    if given.toolbox:
-        RUN.update({form: partial(elsewhere, form, given.toolbox) for form in ("roboticstoolbox", "ets")})
-    found = list(subjects(given.leaves))
+    if options.toolbox:
+        RUN.update(
+            {form: partial(run_in_other_python, form, options.toolbox) for form in ("roboticstoolbox", "ets")}
+        )
+    found = list(make_cases(options.leaves))
     heads = ("form", "tables", "refused", "from Pinocchio at most", "of the bound", "seconds")
     print(markdown(heads, [], left=1), flush=True)
     wrong = 0
-    for form in given.forms:
+    for form in options.forms:
         begin = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
             try:
-                cells, faults = (_fitted if form == "latex" else _compared)(form, found, Path(folder))
-            except Missing as error:
+                cells, faults = (_check_widths if form == "latex" else _compare_form)(
+                    form, found, Path(folder)
+                )
+            except MissingProgramError as error:
                 cells, faults = [f"not run: {error} is missing", "", "", ""], []
         print(f"| {form} | {' | '.join(cells)} | {time.perf_counter() - begin:.0f} |", flush=True)
         print(*(f"WRONG {form}: {fault}" for fault in faults), sep="\n", end="\n" * bool(faults), flush=True)
@@ -265,20 +271,21 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(wrong > 0)
 
 
-def _compared(form: str, found: Sequence[Subject], folder: Path) -> tuple[list[str], list[str]]:
-    taken = [one for one in found if form not in FORMATS or fits(form, one.table)]
+def _compare_form(form: str, found: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
+    taken = [one for one in found if form not in FORMATS or can_represent(form, one.table)]
     if form == "matlab-symbolic":
-        taken = [one for one in taken if 0 < len(one.table.rows) <= SMALL][:FEW]
+        taken = [one for one in taken if 0 < len(one.table.rows) <= MAX_SYMBOLIC_ROWS][:MAX_SYMBOLIC_TABLES]
     figures = [
-        one.off(pose) for one, pose in zip(taken, RUN[form]([one.job for one in taken], folder), strict=True)
+        one.measure_errors(pose)
+        for one, pose in zip(taken, RUN[form]([one.job for one in taken], folder), strict=True)
     ]
     wrong = [one.name for one, (_, share) in zip(taken, figures, strict=True) if not share <= 1.0]
     metres, share = map(max, zip(*figures, strict=True))
     return [str(len(taken)), str(len(found) - len(taken)), f"{metres:.1e} m", f"{share:.0%}"], wrong
 
 
-def _fitted(form: str, found: Sequence[Subject], folder: Path) -> tuple[list[str], list[str]]:
-    over = too_wide([export(one.table, form) for one in found], folder)
+def _check_widths(form: str, found: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
+    over = measure_excess_widths([export(one.table, form) for one in found], folder)
     wide = [f"{one.name} is {x} pt too wide" for one, x in zip(found, over, strict=True) if x]
     return [str(len(found)), "0", f"{len(wide)} wider than the page", ""], wide
 

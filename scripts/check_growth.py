@@ -35,14 +35,14 @@ def _robot(inside: str) -> bytes:
     return f'<robot name="r">{inside}</robot>'.encode()
 
 
-def _filled(size: int, piece: str) -> str:
+def _repeat(size: int, piece: str) -> str:
     """Repeat a piece up to a size in bytes; {i} in the piece is the number of the copy."""
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
 
-def _many(piece: str, before: str = _LINK) -> Kind:
-    return lambda size: _robot(before + _filled(size, piece))
+def _robot_with_many(piece: str, before: str = _LINK) -> Kind:
+    return lambda size: _robot(before + _repeat(size, piece))
 
 
 def _link(name: str, inside: str = "") -> bytes:
@@ -76,11 +76,11 @@ KINDS: dict[str, Kind] = {
     "many blanks in a vector": lambda n: _origin(f"1{' ' * n}0 0"),
     "tabs in a vector": lambda n: _origin("\t" * n + "1 0 0"),
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
-    "bad numbers": _many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
+    "bad numbers": _robot_with_many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
     # Inputs with many comments that suppress findings.
-    "comments that suppress no finding": _many("<!-- urdfkin: ignore[x{i}] y -->\n"),
-    "consecutive comments": _many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
+    "comments that suppress no finding": _robot_with_many("<!-- urdfkin: ignore[x{i}] y -->\n"),
+    "consecutive comments": _robot_with_many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
     # Inputs with long or many names.
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
@@ -89,38 +89,40 @@ KINDS: dict[str, Kind] = {
     "one long type": lambda n: _robot(f'{_LINK}<joint name="j" type="{"a" * n}"/>'),
     "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0">{_LINK}</robot>'.encode(),
     "one long address": lambda n: _link("base", _MESH.format("a" * n)),
-    "equal names": _many('<link name="a"/>', ""),
-    "names of combining marks": _many(f'<link name="{{i}}{_MARKS}"/>', ""),
-    "names that look alike": _many(
+    "equal names": _robot_with_many('<link name="a"/>', ""),
+    "names of combining marks": _robot_with_many(f'<link name="{{i}}{_MARKS}"/>', ""),
+    "names that look alike": _robot_with_many(
         f'<link name="{"ab" * 40}{{i}}"/><joint name="{{i}}" type="x{"ba" * 40}"/>', ""
     ),
-    "misspelt names of links": _many(
+    "misspelt names of links": _robot_with_many(
         f'<link name="{"ab" * 25}{{i}}"/>{_FIXED}<parent link="{"ba" * 25}{{i}}"/><child link="c"/></joint>',
         "",
     ),
-    "unknown links": _many(f'{_FIXED}<parent link="x{{i}}"/><child link="y{{i}}"/></joint>'),
-    "unknown leaders": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="x{}"/>'),
-    "undeclared prefixes": _many("<p{i}:x/>"),
-    "declared prefixes": _many('<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>'),
+    "unknown links": _robot_with_many(f'{_FIXED}<parent link="x{{i}}"/><child link="y{{i}}"/></joint>'),
+    "unknown mimicked joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="x{}"/>'),
+    "undeclared prefixes": _robot_with_many("<p{i}:x/>"),
+    "declared prefixes": _robot_with_many('<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>'),
     # Inputs with many attributes.
-    "attributes of one link": lambda n: _robot('<link name="l" ' + _filled(n, 'a{i}="1" ') + "/>"),
-    "unknown attributes": _many('<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>", ""),
+    "attributes of one link": lambda n: _robot('<link name="l" ' + _repeat(n, 'a{i}="1" ') + "/>"),
+    "unknown attributes": _robot_with_many(
+        '<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>", ""
+    ),
     "one long value": lambda n: _robot(f'{_LINK}<material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'{_LINK}<material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'{_LINK}<material file="{"&amp;" * (n // 5)}"/>'),
     # Inputs with long content between elements.
-    "text": _many("words "),
-    "lines": _many("\n"),
+    "text": _robot_with_many("words "),
+    "lines": _robot_with_many("\n"),
     "lines, then a broken tag": lambda n: _robot(_LINK + "\n" * n + "<"),
-    "references in text": _many("&lt;"),
-    "text between elements": _many("a<gazebo/>"),
-    "text that looks like attributes": _many("\t", f'{_LINK}="'),
-    "text that looks like many attributes": _many("=\"\t='"),
+    "references in text": _robot_with_many("&lt;"),
+    "text between elements": _robot_with_many("a<gazebo/>"),
+    "text that looks like attributes": _robot_with_many("\t", f'{_LINK}="'),
+    "text that looks like many attributes": _robot_with_many("=\"\t='"),
     "one comment": lambda n: _robot(f"{_LINK}<!--{'a' * n}-->"),
-    "comments": _many("<!---->"),
+    "comments": _robot_with_many("<!---->"),
     "one instruction": lambda n: f"<?a {'a' * n}?>".encode() + _robot(_LINK),
     "instructions": lambda n: b"<?a b?>" * (n // 7) + _robot(_LINK),
-    "instructions inside": _many("<?a b?>"),
+    "instructions inside": _robot_with_many("<?a b?>"),
     "one CDATA section": lambda n: _link("base", f"<![CDATA[{'a' * n}]]>"),
     "CDATA sections": lambda n: _link("base", "<![CDATA[a]]>" * (n // 13)),
     "a declaration that does not end": lambda n: b"<?xml version='1.0' " + b"?" * n,
@@ -128,25 +130,25 @@ KINDS: dict[str, Kind] = {
     "undefined entities": lambda n: _robot(f'<link name="&{"a" * n};"/>'),
     "a document type": lambda n: f"<!DOCTYPE {'a' * n}>".encode() + _robot(_LINK),
     # Inputs with an unusual structure.
-    "links without joints": _many('<link name="l{i}"/>\n', ""),
+    "links without joints": _robot_with_many('<link name="l{i}"/>\n', ""),
     "a chain": lambda n: _tree(n, lambda i: i),
     "a star": lambda n: _tree(n, lambda i: 0),
     "one parent of all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
     "a chain of mimic joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
     "a loop": lambda n: _tree(n, lambda i: i).replace(b'<child link="l1"/>', b'<child link="l0"/>', 1),
-    "several parents": _many(
+    "several parents": _robot_with_many(
         f'{_FIXED}<parent link="a"/><child link="b"/></joint>', '<link name="a"/><link name="b"/>'
     ),
     "deep nesting": lambda n: _robot(_LINK + "<a>" * (n // 7) + "</a>" * (n // 7)),
     "misplaced links, deep": lambda n: _robot(
         _LINK + "<a>" * 400 + '<link name="x"/>' * (n // 16) + "</a>" * 400
     ),
-    "unknown elements": _many("<u{i}/>"),
+    "unknown elements": _robot_with_many("<u{i}/>"),
     "children of one joint": lambda n: _robot(
         f'{_LINK}<joint name="j" type="fixed">{"<origin/>" * (n // 9)}</joint>'
     ),
     "shapes": lambda n: _link("base", _SHAPE * (n // 76)),
-    "materials": _many("".join(f'<material name="m{k}"/>' for k in range(9))),
+    "materials": _robot_with_many("".join(f'<material name="m{k}"/>' for k in range(9))),
     "tags that are never closed": lambda n: b'<robot name="r">' + b"<link>" * (n // 6),
     "a file cut in a tag": lambda n: b'<robot name="r"><link name="' + b"a" * n,
     # Inputs with unusual bytes.
@@ -159,16 +161,16 @@ KINDS: dict[str, Kind] = {
 }
 
 
-def cost(kind: str, size: int) -> str:
+def measure_cost(kind: str, size: int) -> str:
     """Return the processor time and the growth of memory, findings included, for each MB of a document."""
 
-    def usage() -> tuple[float, float]:
+    def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
     document = KINDS[kind](size)
-    before = usage()
+    before = read_usage()
     findings = check_text(document, fold=False)
-    seconds, memory = (1e6 * (x - y) / len(document) for x, y in zip(usage(), before, strict=True))
+    seconds, memory = (1e6 * (x - y) / len(document) for x, y in zip(read_usage(), before, strict=True))
     del findings
     return f"{seconds:.2f} s, {memory:.0f} MB"
 
@@ -184,19 +186,19 @@ if __name__ == "__main__":
     option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
     option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
     option("--one", type=int, help="check only one document of this size (bytes) in this process")
-    given = parser.parse_args()
-    if given.one is not None:
-        print(cost(given.words[0], given.one))
+    options = parser.parse_args()
+    if options.one is not None:
+        print(measure_cost(options.words[0], options.one))
         sys.exit()
-    sizes = [float(size) for size in given.sizes.split(",")]
+    sizes = [float(size) for size in options.sizes.split(",")]
     heads = ["seconds and megabytes for each megabyte of", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
-    for kind in (kind for kind in KINDS if not given.words or any(word in kind for word in given.words)):
+    for kind in (kind for kind in KINDS if not options.words or any(word in kind for word in options.words)):
         cells: list[str] = []
         with contextlib.suppress(subprocess.TimeoutExpired):
             for size in sizes:
                 command = [sys.executable, __file__, "--one", str(int(size * 1e6)), kind]
-                done = subprocess.run(command, capture_output=True, check=True, timeout=given.patience)
+                done = subprocess.run(command, capture_output=True, check=True, timeout=options.patience)
                 cells.append(done.stdout.decode().strip())
         cells += ["..."] * (len(sizes) - len(cells))
         print(f"| {kind} | {' | '.join(cells)} |", flush=True)

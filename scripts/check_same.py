@@ -37,7 +37,7 @@ from urdfkin.urdf.catalogue import catalogue
 ROUNDING = 1e-10
 
 
-def pair(name: str, what: str) -> dict[str, Any] | None:
+def check_pair(name: str, what: str) -> dict[str, Any] | None:
     """Check one change of one robot; return None if the change is impossible."""
     a, b = robot(name), changed(name, what)
     if b is None:
@@ -61,7 +61,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     return result | {"holds": worst.lower <= attained and truth <= worst.upper}
 
 
-def summary(some: list[dict[str, Any]]) -> Iterator[str]:
+def summarize(some: list[dict[str, Any]]) -> Iterator[str]:
     wrong = [one for one in some if not one["right"]]
     bounded = [one for one in some if "holds" in one]
     missed = [one for one in bounded if not one["holds"]]
@@ -91,9 +91,9 @@ if __name__ == "__main__":
     some = [json.loads(line) for line in lines]
     known = {(one["robot"], one["change"]) for one in some}
     for name, what in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
-        if (name, what) not in known and (one := pair(name, what)) is not None:
+        if (name, what) not in known and (one := check_pair(name, what)) is not None:
             some.append(one)
             with options.keep.open("a") as file:
                 print(json.dumps(one), file=file)
-    print(*summary([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
+    print(*summarize([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
     sys.exit(any(not one["right"] or not one.get("holds", True) for one in some))

@@ -19,14 +19,14 @@ _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 
-class Doctests(griffe.Extension):
+class DoctestFences(griffe.Extension):
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
         if obj.docstring is not None and obj.path.startswith("urdfkin.robot.Robot."):
             obj.docstring.value = inspect.getdoc(getattr(Robot, obj.name)) or ""
         if obj.docstring is not None:
-            obj.docstring.value = fenced(obj.docstring.value)
+            obj.docstring.value = fence_doctests(obj.docstring.value)
 
 
-def fenced(docstring: str) -> str:
+def fence_doctests(docstring: str) -> str:
     flat = _EXAMPLE.sub(lambda found: textwrap.indent(textwrap.dedent(found[2]), found[1]), docstring)
     return _DOCTEST.sub(r"\1```pycon\n\g<0>\n\1```", flat)

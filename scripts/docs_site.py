@@ -107,12 +107,12 @@ def on_config(config: Any) -> Any:
 def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File
 
-    made = {"cli.md": commands_page(), "api.md": library_page()}
-    made |= {page: subject_page(page) for page in LIBRARY}
+    made = {"cli.md": make_commands_page(), "api.md": make_library_page()}
+    made |= {page: make_subject_page(page) for page in LIBRARY}
     for file in files.documentation_pages():
         if file.src_uri.startswith(LESSONS):
             name = str(Path(file.src_uri).with_suffix(".ipynb"))
-            made[name] = json.dumps(notebook(file.content_string), indent=1)
+            made[name] = json.dumps(make_notebook(file.content_string), indent=1)
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
     return files
@@ -130,7 +130,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 def on_page_content(content: str, **_: Any) -> str:
     from latex2mathml.converter import convert
 
-    def mathml(found: re.Match[str]) -> str:
+    def convert_formula(found: re.Match[str]) -> str:
         alone = found[0].startswith("<p>") and found[0].endswith("</p>")
         text = str(convert(html.unescape(found[1]), display="block" if alone else "inline"))
         text = text.replace("<mover>", '<mover accent="true">')
@@ -139,7 +139,7 @@ def on_page_content(content: str, **_: Any) -> str:
             return f'<div class="formula">{text}</div>'
         return found[0].replace(f"$<code>{found[1]}</code>$", text)
 
-    return _FORMULA.sub(mathml, content)
+    return _FORMULA.sub(convert_formula, content)
 
 
 def on_post_page(output: str, **_: Any) -> str:
@@ -148,45 +148,46 @@ def on_post_page(output: str, **_: Any) -> str:
     return output.replace(dialog, f'{dialog} aria-label="Search"')
 
 
-def notebook(page: str) -> dict[str, Any]:
+def make_notebook(page: str) -> dict[str, Any]:
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):
         kind, text = block.groups()
         if kind == "python" or (kind == "text" and cells and cells[-1]["cell_type"] == "code"):
-            _tell(cells, page[at : block.start()])
+            _add_text(cells, page[at : block.start()])
             at = block.end()
         if kind == "python":
-            cells.append(_cell("code", text, execution_count=None, outputs=[]))
+            cells.append(_make_cell("code", text, execution_count=None, outputs=[]))
         elif kind == "text" and at == block.end():
             cells[-1]["outputs"].append({"output_type": "stream", "name": "stdout", "text": text})
-    _tell(cells, page[at:])
+    _add_text(cells, page[at:])
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
     return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 4}
 
 
-def _tell(cells: list[dict[str, Any]], text: str) -> None:
+def _add_text(cells: list[dict[str, Any]], text: str) -> None:
     text = re.sub(r"\$`(.*?)`\$", r"$\1$", _DISPLAYED.sub(r"$$\1$$", text), flags=re.DOTALL)
     if text := text.strip():
-        cells.append(_cell("markdown", text))
+        cells.append(_make_cell("markdown", text))
 
 
-def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
+def _make_cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
     return {"cell_type": kind, "metadata": {}, "source": source.rstrip(), **more}
 
 
-def library_page() -> str:
+def make_library_page() -> str:
     parts = ["# Library", "`import urdfkin`, then `urdfkin.load` a robot. Every example is run as a test."]
     for page, (title, words, names) in LIBRARY.items():
         parts += [f"## [{title}]({page})", words, "| Name | Purpose |\n|---|---|"]
         rows = [
-            f"| [`{_short(name)}`]({page}#{address(name)}) | {_purpose(name)} |" for name in names.split()
+            f"| [`{_short(name)}`]({page}#{find_address(name)}) | {_purpose(name)} |"
+            for name in names.split()
         ]
         parts[-1] = "\n".join([parts[-1], *rows])
     return "\n\n".join(parts) + "\n"
 
 
-def subject_page(page: str) -> str:
+def make_subject_page(page: str) -> str:
     title, words, names = LIBRARY[page]
     parts = [f"# {title}", words]
     for name in names.split():
@@ -194,11 +195,11 @@ def subject_page(page: str) -> str:
         # The page of a method's subject documents the method, so the entry of `Robot` lists no methods.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
-        parts.append(f"::: {address(name)}\n    options:\n{lines}")
+        parts.append(f"::: {find_address(name)}\n    options:\n{lines}")
     return "\n\n".join(parts) + "\n"
 
 
-def address(name: str) -> str:
+def find_address(name: str) -> str:
     if "." in name:
         return name
     return f"{urdfkin._HOMES[name]}.{name}" if name in urdfkin.__all__ else f"{_ROBOT}.{name}"
@@ -211,7 +212,7 @@ def _short(name: str) -> str:
 
 
 def _purpose(name: str) -> str:
-    module, _, own = address(name).rpartition(".")
+    module, _, own = find_address(name).rpartition(".")
     if module == _ROBOT:
         module, own = "urdfkin.robot", f"Robot.{own}"
     found: Any = importlib.import_module(module)
@@ -221,7 +222,7 @@ def _purpose(name: str) -> str:
     return _EQUATIONS.sub("", " ".join(first.split())).replace("|", "\\|")
 
 
-def commands_page() -> str:
+def make_commands_page() -> str:
     parent = click.Context(cli, info_name="urdfkin", terminal_width=80, **cli.context_settings)
     parts = [
         "# Commands",

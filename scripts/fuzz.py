@@ -1,7 +1,7 @@
 """Test urdfkin with random hostile files: no crash, no hang, and no wrong number without an error.
 
     python scripts/fuzz.py --mutants 20000 --robots 10000 --seed 0 --jobs 2
-    python scripts/fuzz.py --family names --family followers --robots 5000
+    python scripts/fuzz.py --family names --family mimic --robots 5000
 
 There are several families of files:
 
@@ -33,8 +33,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.fuzzing import GOOD, Case, mjcf, robots
-from scripts.fuzzing.mutations import LARGEST, mutant
+from scripts.fuzzing import PASSED, Case, mjcf, robots
+from scripts.fuzzing.mutations import LARGEST, make_mutant
 from urdfkin.urdf.catalogue import catalogue
 
 READY, FIRST_WAIT = "ready", 300.0
@@ -45,15 +45,19 @@ FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
 
 
 @cache
-def files() -> list[Path]:
+def find_small_files() -> list[Path]:
     paths = (entry.path for entry in catalogue().values())
     return [path for path in paths if path.stat().st_size <= LARGEST]
 
 
-def case(seed: int, family: str, number: int) -> Case:
+def make_case(seed: int, family: str, number: int) -> Case:
     if family in mjcf.FAMILIES:
-        return mjcf.robot(seed, family, number)
-    return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
+        return mjcf.make_model(seed, family, number)
+    return (
+        make_mutant(seed, number, find_small_files())
+        if family == MUTANTS
+        else robots.make_robot(seed, family, number)
+    )
 
 
 class Worker:
@@ -96,18 +100,18 @@ class Worker:
         return process.exitcode
 
 
-def work(seed: int, pipe: Connection) -> None:
+def run_worker(seed: int, pipe: Connection) -> None:
     """Receive the family and number of a case, test the case, and send the outcome, until killed."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
     os.dup2(nothing, 2)
-    evaluate(Case("as it is", files()[0].read_bytes()))
+    evaluate(Case("as it is", find_small_files()[0].read_bytes()))
     pipe.send(READY)
     while True:
-        outcome = evaluate(case(seed, *pipe.recv()))
-        pipe.send((outcome.word, outcome.details))
+        outcome = evaluate(make_case(seed, *pipe.recv()))
+        pipe.send((outcome.result, outcome.details))
 
 
 def fuzz(
@@ -117,18 +121,18 @@ def fuzz(
     counts: collections.Counter[str] = collections.Counter()
 
     def run(_: int) -> None:
-        worker = Worker(partial(work, seed), timeout)
+        worker = Worker(partial(run_worker, seed), timeout)
         for family, number in waiting:
             word, details = worker.evaluate(family, number)
             counts[word] += 1
-            if word not in GOOD:
-                made = case(seed, family, number)
+            if word not in PASSED:
+                made = make_case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
                 (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(made.data)
-                note = f"{made.words}\n{word}\n{details}\n"
+                note = f"{made.description}\n{word}\n{details}\n"
                 (keep / f"{family}-{seed}-{number}.txt").write_text(note, "utf-8")
-                print(f"{family} {number} ({made.what}): {word}", flush=True)
+                print(f"{family} {number} ({made.name}): {word}", flush=True)
         worker.stop(0.0)
 
     with ThreadPoolExecutor(jobs) as pool:
@@ -136,7 +140,7 @@ def fuzz(
     return counts
 
 
-def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
+def list_cases(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
@@ -155,7 +159,7 @@ def main() -> int:
     option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
     options = parser.parse_args()
     families = options.family or FAMILIES
-    asked = shares(families, options.mutants, options.robots)
+    asked = list_cases(families, options.mutants, options.robots)
     if options.only is not None:
         if len(families) != 1:
             parser.error("--only needs exactly one --family")
@@ -166,7 +170,7 @@ def main() -> int:
     print(f"{total} robots of {len(families)} families, seed {options.seed}, {seconds:.0f} s")
     for word, count in counts.most_common():
         print(f"{count:8d}  {word}")
-    bad = total - sum(counts[word] for word in GOOD)
+    bad = total - sum(counts[word] for word in PASSED)
     print(f"{bad} robots caused a failure" + (f": see {options.keep}" if bad else ""))
     return 1 if bad else 0
 

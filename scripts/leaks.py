@@ -27,7 +27,7 @@ _ROBOT = """<robot name="r{k}">
 """
 
 
-def use(k: int, folder: Path) -> None:
+def use_robot(k: int, folder: Path) -> None:
     text = _ROBOT.format(k=k, x=0.1 + 1e-6 * k, odd="&lt;b&gt; " if k % 3 else "")
     path = folder / f"{k % 10}.urdf"
     path.write_text(text if k % 5 else text.replace("</robot>", ""))
@@ -40,7 +40,7 @@ def use(k: int, folder: Path) -> None:
     robot.dh()
 
 
-def usage() -> dict[str, float]:
+def measure_usage() -> dict[str, float]:
     """Return the resident memory (MiB), the open descriptors and the number of objects."""
     gc.collect()
     here = psutil.Process()
@@ -54,9 +54,9 @@ def measure(n: int) -> list[dict[str, float]]:
         warnings.simplefilter("ignore")
         found = []
         for k in range(n):
-            use(k, Path(folder))
+            use_robot(k, Path(folder))
             if (k + 1) % (n // PARTS) == 0:
-                found.append(usage())
+                found.append(measure_usage())
                 print(f"{k + 1} robots: {json.dumps(found[-1])}", file=sys.stderr, flush=True)
     return found
 

@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-from scripts.pages import DOCS, inserted, table
+from scripts.pages import DOCS, insert_parts, table
 
 ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
@@ -57,12 +57,12 @@ def package_of(module: str) -> str:
     return rest[0] if tree == "urdfkin" and rest and rest != ["__main__"] else tree
 
 
-def named(text: str) -> Iterator[str]:
+def imported_names(text: str) -> Iterator[str]:
     """Yield the names that a module's text imports; a name from a string ends in `.*`.
 
-    >>> list(named("if TYPE_CHECKING: from urdfkin.errors import InputError"))
+    >>> list(imported_names("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
-    >>> list(named("COMMANDS = {'plot': 'urdfkin.cli.view'}"))
+    >>> list(imported_names("COMMANDS = {'plot': 'urdfkin.cli.view'}"))
     ['urdfkin.cli.view.*']
     """
     for node in ast.walk(ast.parse(text)):
@@ -75,14 +75,17 @@ def named(text: str) -> Iterator[str]:
 
 
 @cache
-def all_named() -> Mapping[str, frozenset[str]]:
-    return {module: frozenset(named(path.read_text(encoding="utf-8"))) for module, path in modules().items()}
+def imported_names_by_module() -> Mapping[str, frozenset[str]]:
+    return {
+        module: frozenset(imported_names(path.read_text(encoding="utf-8")))
+        for module, path in modules().items()
+    }
 
 
 @cache
-def imports() -> Mapping[str, frozenset[str]]:
+def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
-    for module, names in all_named().items():
+    for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
         # An imported name is a module, or a name that is defined in a module.
         ours = [
@@ -107,34 +110,38 @@ def _reexported(package: str) -> frozenset[str]:
     return frozenset(alias.asname or alias.name for node in taken for alias in node.names)
 
 
-def upwards() -> list[str]:
+def find_forbidden_imports() -> list[str]:
     """List the forbidden imports: a package must not import a package that comes later in the order."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"
-        for module, others in imports().items()
+        for module, others in imports_by_module().items()
         for other in others
         if package_of(module) != package_of(other) and rank[package_of(other)] > rank[package_of(module)]
     )
 
 
-def cycles() -> list[list[str]]:
+def find_cycles() -> list[list[str]]:
     try:
-        TopologicalSorter(imports()).prepare()
+        TopologicalSorter(imports_by_module()).prepare()
     except CycleError as error:
         return [error.args[1]]
     return []
 
 
-def arrows() -> set[tuple[str, str]]:
-    pairs = ((package_of(one), package_of(other)) for one, others in imports().items() for other in others)
+def package_imports() -> set[tuple[str, str]]:
+    pairs = (
+        (package_of(one), package_of(other))
+        for one, others in imports_by_module().items()
+        for other in others
+    )
     return {(one, other) for one, other in pairs if one != other}
 
 
 _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
-def picture() -> str:
+def draw_picture() -> str:
     """Draw a row and a column for each package.
 
     A dot shows that the package of the row imports the package of the column.
@@ -159,22 +166,22 @@ def picture() -> str:
             f'<text transform="translate({own + 16} {_TOP - 8}) rotate(-90)" fill="#666">'
             f"{package.name}</text>",
         ]
-    for below, above in sorted((place[one], place[other]) for one, other in arrows()):
+    for below, above in sorted((place[one], place[other]) for one, other in package_imports()):
         x, y = _LEFT + _CELL * above + _CELL // 2, _TOP + _ROW * below + 13
         said = f"{PACKAGES[below].name} imports {PACKAGES[above].name}"
         lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#D55E00"><title>{said}</title></circle>')
     return "\n".join((*lines, "</svg>", ""))
 
 
-def page() -> str:
+def make_page() -> str:
     rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
     packages = table(("Package", "Purpose", "Contents"), rows)
-    return inserted(PAGE.read_text(encoding="utf-8"), packages=packages)
+    return insert_parts(PAGE.read_text(encoding="utf-8"), packages=packages)
 
 
 if __name__ == "__main__":
-    if wrong := [*upwards(), *map(" <-> ".join, cycles())]:
+    if wrong := [*find_forbidden_imports(), *map(" <-> ".join, find_cycles())]:
         sys.exit("\n".join(wrong))
-    PAGE.write_text(page(), encoding="utf-8")
-    PICTURE.write_text(picture(), encoding="utf-8")
-    print(f"{len(PACKAGES)} packages, {len(arrows())} imports between them")
+    PAGE.write_text(make_page(), encoding="utf-8")
+    PICTURE.write_text(draw_picture(), encoding="utf-8")
+    print(f"{len(PACKAGES)} packages, {len(package_imports())} imports between them")

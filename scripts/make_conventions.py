@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 import urdfkin
-from scripts.pages import DOCS, inserted, table
+from scripts.pages import DOCS, insert_parts, table
 from urdfkin.model.conventions import Convention, find_convention
 from urdfkin.model.conventions.convention import _load_built_in, spell_name
 from urdfkin.model.tree import FloatArray
@@ -59,25 +59,25 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
 #: A robot that shows the order of coordinates: joints z and a at the base, and joint k after z.
-LIMBS = _robot(
+TREE = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
     _joint("k", "revolute", "l1", "l3"),
 )
-TURNS = _robot(
+CONTINUOUS = _robot(
     *(_joint(f"j{i}", "continuous", "base" if i == 1 else f"l{i - 1}", f"l{i}") for i in (1, 2, 3))
 )
-FOLLOWS = _robot(
+MIMIC = _robot(
     _joint("a", "revolute", "base", "l1"),
     _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="0.5" offset="0.1"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-UNLIKE = _robot(
+MIXED_MIMIC = _robot(
     _joint("a", "revolute", "base", "l1"),
     _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
+MASSLESS, NEGATIVE_MASS = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
 #: MuJoCo's free joint connects a body to the world only.
 FREE = (
     '<mujoco><worldbody><body name="l1" pos="0 0 0"><freejoint name="f"/>'
@@ -103,7 +103,7 @@ _DISTRIBUTIONS = {
 Readings = Mapping[str, FloatArray]
 
 
-def which(found: FloatArray, readings: Readings) -> str:
+def find_definition(found: FloatArray, readings: Readings) -> str:
     """Return the only definition that matches a result."""
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
@@ -179,59 +179,68 @@ class MeasuredMotion:
         }
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
-    def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
+    def mujoco_vector(self, function: Callable[..., None], local: int) -> FloatArray:
         six = np.empty(6)
         function(self.mj_model, self.mj_data, mujoco.mjtObj.mjOBJ_XBODY, self.body, six, local)
         return six
 
 
-def rows() -> Iterator[Row]:
-    yield from _motions(MeasuredMotion())
-    yield from _layout()
-    yield from _free()
+def measure_rows() -> Iterator[Row]:
+    yield from _motion_rows(MeasuredMotion())
+    yield from _layout_rows()
+    yield from _free_body_rows()
 
 
-def _motions(asked: MeasuredMotion) -> Iterator[Row]:
-    robot, readings, frame = asked.robot, asked.velocity_readings(), (asked.model, asked.data, asked.frame)
+def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
+    robot, readings, frame = (
+        measured.robot,
+        measured.velocity_readings(),
+        (measured.model, measured.data, measured.frame),
+    )
     for name, local in (("local_world_aligned", 0), ("local", 1), ("world", None)):
         theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
         mujocos = "not available"
         if local is not None:
-            found = asked.mujocos(mujoco.mj_objectVelocity, local)
-            mujocos = f"{which(found, readings)} (`flg_local={local}`)"
-        ours = robot.velocity(asked.q, asked.v, "l3", name)
-        yield f"velocity, `{name}`", which(ours, readings), which(theirs, readings), mujocos
+            found = measured.mujoco_vector(mujoco.mj_objectVelocity, local)
+            mujocos = f"{find_definition(found, readings)} (`flg_local={local}`)"
+        ours = robot.velocity(measured.q, measured.v, "l3", name)
+        yield (
+            f"velocity, `{name}`",
+            find_definition(ours, readings),
+            find_definition(theirs, readings),
+            mujocos,
+        )
     columns = np.zeros((6, 3))  # MuJoCo's `jacp` above `jacr`, at the body's origin
-    at = asked.mj_data.xpos[asked.body]
-    mujoco.mj_jac(asked.mj_model, asked.mj_data, columns[:3], columns[3:], at, asked.body)
+    at = measured.mj_data.xpos[measured.body]
+    mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], at, measured.body)
     yield (
         "rows of a Jacobian J, determined from J v",
-        which(robot.jacobian(asked.q, "l3") @ asked.v, readings),
-        which(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ asked.v, readings),
-        f"`mj_jac`, `jacp` above `jacr`: {which(columns @ asked.v, readings)}",
+        find_definition(robot.jacobian(measured.q, "l3") @ measured.v, readings),
+        find_definition(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ measured.v, readings),
+        f"`mj_jac`, `jacp` above `jacr`: {find_definition(columns @ measured.v, readings)}",
     )
-    _, p, v, w, _, _ = asked.motion()
-    com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
+    _, p, v, w, _, _ = measured.motion()
+    com = measured.mj_data.subtree_com[measured.mj_model.body_rootid[measured.body]]
     at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
     points = {
         at_com: np.concatenate((w, v + np.cross(w, com - p))),
         "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
     }
-    stored = asked.data.v[asked.model.frames[asked.frame].parentJoint].vector
+    stored = measured.data.v[measured.model.frames[measured.frame].parentJoint].vector
     yield (
         "velocity stored in the data structure",
         "none",
-        f"`data.v`: {which(stored, readings)}",
-        f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), points)}",
+        f"`data.v`: {find_definition(stored, readings)}",
+        f"`cvel`: {find_definition(np.array(measured.mj_data.cvel[measured.body]), points)}",
     )
-    linear_first = asked.acceleration_readings(flipped=False)
-    result = which(robot.acceleration(asked.q, asked.v, asked.a, "l3"), linear_first)
+    linear_first = measured.acceleration_readings(flipped=False)
+    result = find_definition(robot.acceleration(measured.q, measured.v, measured.a, "l3"), linear_first)
     spatial, classical = (
-        which(get(*frame, pin.LOCAL_WORLD_ALIGNED).vector, linear_first)
+        find_definition(get(*frame, pin.LOCAL_WORLD_ALIGNED).vector, linear_first)
         for get in (pin.getFrameAcceleration, pin.getFrameClassicalAcceleration)
     )
-    six = asked.mujocos(mujoco.mj_objectAcceleration, 0)
-    of_mujoco = which(six, asked.acceleration_readings(flipped=True))
+    six = measured.mujoco_vector(mujoco.mj_objectAcceleration, 0)
+    of_mujoco = find_definition(six, measured.acceleration_readings(flipped=True))
     yield (
         "acceleration, in world axes",
         f"`acceleration`: {result}",
@@ -240,7 +249,7 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
     )
 
 
-def _order(names: Iterable[str]) -> str:
+def _name_order(names: Iterable[str]) -> str:
     orders = {
         "azk": "depth first, sibling joints by name",
         "zka": "depth first, in file order",
@@ -250,39 +259,39 @@ def _order(names: Iterable[str]) -> str:
     return orders["".join(names)]
 
 
-def _layout() -> Iterator[Row]:
-    limbs, turns, follows = (mujoco.MjModel.from_xml_string(text) for text in (LIMBS, TURNS, FOLLOWS))
+def _layout_rows() -> Iterator[Row]:
+    limbs, turns, follows = (mujoco.MjModel.from_xml_string(text) for text in (TREE, CONTINUOUS, MIMIC))
     data = mujoco.MjData(follows)
     data.qpos[:] = 0.7, 0.0, 0.0
     mujoco.mj_kinematics(follows, data)
     mujocos = "coupled"
     if data.qpos[1] == 0.0 and follows.neq == 1:
         mujocos = f"independent, {follows.nq} coordinates; {follows.neq} constraint, in the dynamics only"
-    free, coupled = (pin.buildModelFromXML(FOLLOWS, mimic=mimic) for mimic in (False, True))
+    free, coupled = (pin.buildModelFromXML(MIMIC, mimic=mimic) for mimic in (False, True))
     yield (
         "order of coordinates",
-        _order(urdfkin.load(LIMBS).coordinate_names),
-        _order(list(pin.buildModelFromXML(LIMBS).names)[1:]),
-        _order(limbs.joint(i).name for i in range(limbs.njnt)),
+        _name_order(urdfkin.load(TREE).coordinate_names),
+        _name_order(list(pin.buildModelFromXML(TREE).names)[1:]),
+        _name_order(limbs.joint(i).name for i in range(limbs.njnt)),
     )
     yield (
         "numbers in q for a continuous joint",
-        f"{urdfkin.load(TURNS).nq // 3}, the angle",
-        f"{pin.buildModelFromXML(TURNS).nq // 3}, its cosine and sine",
+        f"{urdfkin.load(CONTINUOUS).nq // 3}, the angle",
+        f"{pin.buildModelFromXML(CONTINUOUS).nq // 3}, its cosine and sine",
         f"{turns.nq // 3}, the angle",
     )
     yield (
         "a joint with `<mimic>`",
-        f"coupled: {urdfkin.load(FOLLOWS).nq} coordinates for 3 joints",
+        f"coupled: {urdfkin.load(MIMIC).nq} coordinates for 3 joints",
         f"independent, {free.nq} coordinates; coupled with `mimic=True`, {coupled.nq}",
         mujocos,
     )
-    yield "a continuous joint with `<mimic>` of a revolute joint", *_readers(UNLIKE)
-    yield "a moving link without `<inertial>`", *_readers(LIGHT)
-    yield "a link with negative mass", *_readers(NEGATIVE)
+    yield "a continuous joint with `<mimic>` of a revolute joint", *_read_answers(MIXED_MIMIC)
+    yield "a moving link without `<inertial>`", *_read_answers(MASSLESS)
+    yield "a link with negative mass", *_read_answers(NEGATIVE_MASS)
 
 
-def _readers(text: str) -> tuple[str, str, str]:
+def _read_answers(text: str) -> tuple[str, str, str]:
 
     def reads(load: Callable[..., object], **how: bool) -> bool:
         try:
@@ -302,7 +311,7 @@ def _readers(text: str) -> tuple[str, str, str]:
     return f"{ours}, with {', '.join(codes)}" if codes else ours, theirs, mujocos
 
 
-def _free() -> Iterator[Row]:
+def _free_body_rows() -> Iterator[Row]:
     rng = np.random.default_rng(1)
     xyzw = rng.normal(size=4)
     xyzw /= np.linalg.norm(xyzw)
@@ -329,7 +338,9 @@ def _free() -> Iterator[Row]:
         "x, y, z, then qw, qx, qy, qz": np.array([*p, *np.roll(xyzw, 1)]),
     }
     rotations = (lambda q: robot.placement(q, "l1")[:3, :3]), pinocchios, mujocos
-    ours, theirs, third = (which(R, {name: R_of(q) for name, q in orders.items()}) for R_of in rotations)
+    ours, theirs, third = (
+        find_definition(R, {name: R_of(q) for name, q in orders.items()}) for R_of in rotations
+    )
     yield "q of a free body", ours, theirs, third
     axes = {
         "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
@@ -341,16 +352,21 @@ def _free() -> Iterator[Row]:
     pin.forwardKinematics(model, data, q, rates)
     of_pinocchio = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
     found = robot.velocity(q, rates, "l1"), of_pinocchio, np.roll(six, 3)
-    yield "v of a free body", which(found[0], axes), which(found[1], axes), which(found[2], axes)
+    yield (
+        "v of a free body",
+        find_definition(found[0], axes),
+        find_definition(found[1], axes),
+        find_definition(found[2], axes),
+    )
 
 
-def _table(names: tuple[str, ...]) -> str:
-    columns = [_cells(find_convention(name)) for name in names]
+def _make_table(names: tuple[str, ...]) -> str:
+    columns = [_make_cells(find_convention(name)) for name in names]
     heads = ["", *(f"{find_convention(name).title} (`{name}`)" for name in names)]
     return table(heads, [(what, *(column[what] for column in columns)) for what in columns[0]])
 
 
-def _cells(how: Convention) -> dict[str, str]:
+def _make_cells(how: Convention) -> dict[str, str]:
     order = {"given": "no known rule", "name": "by name", "file": "that of the file"}.get(
         how.order, how.order.replace("file", "place in the file")
     )
@@ -380,13 +396,13 @@ def _cells(how: Convention) -> dict[str, str]:
     }
 
 
-def measure() -> None:
+def write_measurements() -> None:
     from tests.model.conventions.libraries import LIBRARIES
 
     for name, library in LIBRARIES.items():
         package = _DISTRIBUTIONS.get(name, name)
         try:
-            line = f'measurement = "{package} {metadata.version(package)}, {_measured(name, library)}"'
+            line = f'measurement = "{package} {metadata.version(package)}, {_measure_library(name, library)}"'
         except metadata.PackageNotFoundError:
             continue
         head, mark, rest = DATA.read_text("utf-8").partition(f"[{name}]\n")
@@ -397,7 +413,7 @@ def measure() -> None:
         DATA.write_text(head + mark + own + blank + others, "utf-8")
 
 
-def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
+def _measure_library(name: str, make: Callable[[Any, Path], Any]) -> str:
     from tests.model.conventions.test_libraries import _conversion, _differences, _loaded
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())
@@ -421,14 +437,14 @@ def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
     return f"{agree} of {len(robots)} robots, at most {worst:.0e} off, {100 * share:.2g} % of the bound"
 
 
-def page() -> str:
+def make_page() -> str:
     heads = ("", "urdfkin", f"Pinocchio {pin.__version__}", f"MuJoCo {mujoco.__version__}")
-    tools = "\n\n".join(map(_table, _TABLES))
-    return inserted(PAGE.read_text("utf-8"), measured=table(heads, rows()), tools=tools)
+    tools = "\n\n".join(map(_make_table, _TABLES))
+    return insert_parts(PAGE.read_text("utf-8"), measured=table(heads, measure_rows()), tools=tools)
 
 
 if __name__ == "__main__":
     if "--measure" in sys.argv[1:]:
-        measure()
+        write_measurements()
         _load_built_in.cache_clear()
-    PAGE.write_text(page(), "utf-8")
+    PAGE.write_text(make_page(), "utf-8")

@@ -24,22 +24,22 @@ import numpy as np
 import platformdirs
 
 import urdfkin
-from scripts.pages import DOCS, inserted, table
+from scripts.pages import DOCS, insert_parts, table
 from urdfkin.comparison.readers import joint_values
 from urdfkin.validation.vectors import Feature, features
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
 
-PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
-DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
+PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
+DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
 #: A pose is correct if no coordinate (m) and no entry of the rotation matrix differs by more than this.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
-RIGHT = 1e-9
+TOLERANCE = 1e-9
 #: Time limit (s) of the process that tests the remaining features.
 _SECONDS = 60
-_QUOTED = 160
+_MESSAGE_LENGTH = 160
 VERDICTS = {
     "right": "right",
     "wrong": "different, without an error",
@@ -48,31 +48,33 @@ VERDICTS = {
 }
 
 
-def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
+def draw_configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     return [joint_values(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
 
 
-def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
+def compute_expected_poses(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     links = list(robot.link_names)
     T = robot.placement(robot.sample(CONFIGURATIONS, seed=0), links)
     return [dict(zip(links, one, strict=True)) for one in T]
 
 
-def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]) -> dict[str, Any]:
+def make_cell(
+    feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]
+) -> dict[str, Any]:
     if "error" in answer:
-        return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
+        return {"verdict": "refused", "message": answer["error"][:_MESSAGE_LENGTH]}
     if any("tip" not in theirs for theirs in answer["poses"]):
         return {"verdict": "refused", "message": "the link tip is missing"}
     worst = max(
         float(np.abs(mine[link] - theirs[link]).max())
-        for mine, theirs in zip(expected(robot), answer["poses"], strict=True)
+        for mine, theirs in zip(compute_expected_poses(robot), answer["poses"], strict=True)
         for link in mine
         if link in theirs
     )
-    if worst <= RIGHT:
+    if worst <= TOLERANCE:
         return {"verdict": "right"}
     found: dict[str, Any] = {"verdict": "wrong", "difference": float(f"{worst:.3g}")}
-    free = [name for name in answer["joints"] if name not in configurations(robot)[0]]
+    free = [name for name in answer["joints"] if name not in draw_configurations(robot)[0]]
     notes = [f"{name} has no coordinate" for name in answer["unset"]]
     notes += [f"{name} is free" for name in free]
     if notes:
@@ -83,7 +85,7 @@ def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[s
     return found
 
 
-def environment(folder: Path, library: str) -> Path:
+def make_environment(folder: Path, library: str) -> Path:
     place, package = folder / library, LIBRARIES[library].package
     python = place / "bin" / "python"
     wanted = f"{package}=={DATA['versions'][library]}"
@@ -94,7 +96,7 @@ def environment(folder: Path, library: str) -> Path:
     return python
 
 
-def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     todo = list(cases)
     while todo:
         try:
@@ -116,28 +118,28 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
     """Measure some libraries; all other libraries keep their earlier values."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
-        {"name": name, "text": feature.text, "configurations": configurations(robots[name])}
+        {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}
         for name, feature in FEATURES.items()
     ]
     versions, cells = dict(before.get("versions", {})), dict(before.get("cells", {}))
     for library in libraries:
         print(library, flush=True)
-        python = environment(folder, library)
-        found = {answer["name"]: answer for answer in answers(python, library, cases)}
+        python = make_environment(folder, library)
+        found = {answer["name"]: answer for answer in run_library(python, library, cases)}
         versions[library] = DATA["versions"][library]
         cells[library] = {
-            name: cell(feature, robots[name], library, found[name]) for name, feature in FEATURES.items()
+            name: make_cell(feature, robots[name], library, found[name]) for name, feature in FEATURES.items()
         }
     order = [name for name in LIBRARIES if name in cells]
     return {
-        "tolerance": RIGHT,
+        "tolerance": TOLERANCE,
         "configurations": CONFIGURATIONS,
         "versions": {name: versions[name] for name in order},
         "cells": {name: cells[name] for name in order},
     }
 
 
-def page(text: str, figures: Mapping[str, Any]) -> str:
+def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
     notes: dict[str, Any] = {}  # the documented differences; a key is the letter of a footnote
@@ -171,7 +173,7 @@ def page(text: str, figures: Mapping[str, Any]) -> str:
                 clean = reason.replace("|", r"\|").replace("`", "'")
                 quoted = f"`{clean}`" if one["verdict"] == "refused" else clean
                 reasons.setdefault((library, quoted), []).append(feature)
-    return inserted(
+    return insert_parts(
         text,
         cells=table(["", *(f"{titles[name]} {versions[name]}" for name in cells)], rows),
         stated="\n".join(stated),
@@ -191,9 +193,9 @@ if __name__ == "__main__":
     parser.add_argument("libraries", nargs="*", choices=[*names, []], help="libraries; by default all")
     parser.add_argument("--environments", type=Path, default=folder, help=f"default: {folder}")
     parser.add_argument("--page", action="store_true", help="write the page from the JSON file")
-    given = parser.parse_args()
+    options = parser.parse_args()
     figures = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else {}
-    if not given.page:
-        figures = measure(given.environments, given.libraries or names, figures)
+    if not options.page:
+        figures = measure(options.environments, options.libraries or names, figures)
         FIGURES.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
-    PAGE.write_text(page(PAGE.read_text("utf-8"), figures), "utf-8")
+    PAGE.write_text(make_page(PAGE.read_text("utf-8"), figures), "utf-8")

@@ -22,7 +22,7 @@ import numpy as np
 import urdfkin
 from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
-from scripts.pages import DOCS, inserted, table
+from scripts.pages import DOCS, insert_parts, table
 from urdfkin.compiled.preload import use_only
 from urdfkin.kinematics.registry import equations_page
 from urdfkin.model.configuration import draw_base_motion
@@ -40,7 +40,7 @@ from urdfkin.verify.exact.enclosure import Enclosures
 from urdfkin.verify.pinocchio import version
 
 
-def _cell(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
 
@@ -79,7 +79,7 @@ LIMITS = {
 }
 
 
-def findings() -> dict[str, str]:
+def make_findings_parts() -> dict[str, str]:
     limits = [
         (f"{limit:,} {words}", f"`{option}`" * bool(option)) for option, (limit, words) in LIMITS.items()
     ]
@@ -90,7 +90,7 @@ def findings() -> dict[str, str]:
                 rule.id,
                 rule.slug,
                 rule.severity.value,
-                _cell(shorten(page_of(rule.id).title, 200)),
+                _escape(shorten(page_of(rule.id).title, 200)),
                 f"*{rule.pinocchio_reading.value}*" if rule.pinocchio_reading else "",
             )
             for rule in RULES.values()
@@ -99,12 +99,12 @@ def findings() -> dict[str, str]:
         heads = ("code", "name", "severity", "finding", "Pinocchio")
         codes.append(f"### {family}\n\n{table(heads, rows)}\n")
     found = []
-    for name, finding in ((one, finding) for one in catalogue() for finding in warnings_of(one)):
+    for name, finding in ((one, finding) for one in catalogue() for finding in list_warnings(one)):
         lines = f"line {finding.line}" + (
             f" and {len(finding.other_lines)} more" if finding.other_lines else ""
         )
         what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-        found.append((name, finding.code, lines, _cell(shorten(what, 200)), REMARKS[finding.code]))
+        found.append((name, finding.code, lines, _escape(shorten(what, 200)), REMARKS[finding.code]))
     return {
         "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
         "codes": "\n".join(codes),
@@ -112,11 +112,11 @@ def findings() -> dict[str, str]:
     }
 
 
-def warnings_of(robot: str) -> list[Finding]:
+def list_warnings(robot: str) -> list[Finding]:
     return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
 
 
-def reports() -> dict[str, str]:
+def make_reports_parts() -> dict[str, str]:
     whole = VALIDATION.schema()
     parts = {"The document": whole, **{f"`{name}`": part for name, part in whole["$defs"].items()}}
     layout = []
@@ -125,29 +125,31 @@ def reports() -> dict[str, str]:
         for name, entry in part["properties"].items():
             # An entry without a description has the description of its type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
-            rows.append((f"`{name}`", _type(entry), _cell(entry.get("description") or kind["description"])))
+            rows.append(
+                (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
+            )
         heads = ("entry", "type", "meaning")
         layout.append(f"### {title}\n\n{part['description']}\n\n{table(heads, rows)}\n")
     return {"layout": "\n".join(layout)}
 
 
-def _type(entry: dict[str, Any]) -> str:
+def _format_type(entry: dict[str, Any]) -> str:
     """Return a type as text, such as `number or null` or `list of Check`."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:
-        return " or ".join(_type(choice) for choice in entry["anyOf"])
+        return " or ".join(_format_type(choice) for choice in entry["anyOf"])
     if "const" in entry:
         return f"`{entry['const']}`"
     if "enum" in entry:
         return ", ".join("null" if word is None else f"`{word}`" for word in entry["enum"])
     if entry["type"] == "array":
         count = entry.get("minItems")
-        return f"{f'{count} ×' if count else 'list of'} {_type(entry['items'])}"
+        return f"{f'{count} ×' if count else 'list of'} {_format_type(entry['items'])}"
     return str(entry["type"])
 
 
-STUDIED = {
+STUDIED_ROBOTS = {
     "panda": "arm with seven joints, gripper with a mimic joint",
     "ur5": "arm with six-digit angles",
     "xarm7": "arm from CAD",
@@ -160,35 +162,35 @@ STUDIED = {
     "so100": "hobby arm, skew axes",
     "polar": "polar robot of the textbook",
 }
-MOVING = ("talos", "anymal", "ur5")
+MOVING_BASE_ROBOTS = ("talos", "anymal", "ur5")
 #: Numbers of samples of each robot in the accuracy study and in the table of enclosures.
-SAMPLES, ENCLOSED = 10, 5
+SAMPLES, ENCLOSURE_SAMPLES = 10, 5
 
 
-def study() -> dict[str, str]:
+def make_accuracy_parts() -> dict[str, str]:
     studies = {
         f"{name}: {kind}": accuracy_study(urdfkin.load(name), samples=SAMPLES)
-        for name, kind in STUDIED.items()
+        for name, kind in STUDIED_ROBOTS.items()
     }
-    for name in MOVING:
+    for name in MOVING_BASE_ROBOTS:
         base = draw_base_motion(SAMPLES, np.random.default_rng([0, 1]))
         studies[f"{name} on a moving base"] = accuracy_study(urdfkin.load(name), samples=SAMPLES, base=base)
-    return study_parts(studies)
+    return format_studies(studies)
 
 
-def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
-    lines = [line for study in studies.values() for line in as_json_data(study)["lines"]]
+def format_studies(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
+    lines = [line for study in studies.values() for line in as_json_data(make_accuracy_parts)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 Each line of the tables below compares the typical errors of both libraries:
 {more_accurate_counts(lines)}. Equal errors are
 the same double. The median ratio of urdfkin's typical error to Pinocchio's is
 {median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""
-    sections = [f"## {name}\n\n{_errors(study.lines)}" for name, study in studies.items()]
+    sections = [f"## {name}\n\n{_make_error_table(study.lines)}" for name, study in studies.items()]
     return {"counts": counts, "tables": "\n\n".join(sections)}
 
 
-def _errors(lines: tuple[AccuracyLine, ...]) -> str:
+def _make_error_table(lines: tuple[AccuracyLine, ...]) -> str:
     sides = [f"{side} {error}" for error in ("worst", "typical") for side in ("urdfkin", "Pinocchio")]
     rows = [
         (
@@ -204,27 +206,27 @@ def _errors(lines: tuple[AccuracyLine, ...]) -> str:
 
 
 #: Robots whose enclosures are measured.
-PROVEN = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
-LENGTHS = (3, 10, 30, 100)
+ENCLOSED_ROBOTS = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
+CHAIN_LENGTHS = (3, 10, 30, 100)
 
 
-def enclosures() -> dict[str, str]:
+def make_enclosures_parts() -> dict[str, str]:
     heads = ("robot", "joints", "digits", "widest, steps", "urdfkin inside", "Pinocchio inside", "ms")
     long = ("joints", "digits", "acceleration", "widest interval", "ms")
     with use_only("compiled"):
-        robots = table(heads, _of_robots(), left=1)
+        robots = table(heads, _robot_rows(), left=1)
         return {
-            "robots": f"{ENCLOSED} samples, Pinocchio {version()}:\n\n{robots}",
-            "chains": table(long, _of_chains(), left=0),
+            "robots": f"{ENCLOSURE_SAMPLES} samples, Pinocchio {version()}:\n\n{robots}",
+            "chains": table(long, _chain_rows(), left=0),
         }
 
 
-def _of_robots() -> Iterator[tuple[object, ...]]:
-    for name in PROVEN:
+def _robot_rows() -> Iterator[tuple[object, ...]]:
+    for name in ENCLOSED_ROBOTS:
         robot = urdfkin.load(name)
         depth = len(robot.tree.path(robot.tree.frame_link(robot.tip_frame)))
         for digits in (15, None):
-            proofs, ms = _proofs(robot, ENCLOSED, digits)
+            proofs, ms = _compute_enclosures(robot, ENCLOSURE_SAMPLES, digits)
             parts = [
                 part
                 for p in proofs
@@ -243,17 +245,17 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
             yield name, depth, proofs[0].digits, f"{steps:.3g}", *(f"{x:.0%}" for x in inside), f"{ms:.1f}"
 
 
-def _of_chains() -> Iterator[tuple[object, ...]]:
-    for length in LENGTHS:
-        robot = urdfkin.load(askew(length), verify=False)
+def _chain_rows() -> Iterator[tuple[object, ...]]:
+    for length in CHAIN_LENGTHS:
+        robot = urdfkin.load(make_askew_chain(length), verify=False)
         for digits in (15, 50, None):
-            (proof,), ms = _proofs(robot, 1, digits)
+            (proof,), ms = _compute_enclosures(robot, 1, digits)
             size = float(np.abs(proof.acceleration.urdfkin).max())
             widest = float(proof.acceleration.width.max())
             yield length, proof.digits, f"{size:.1e}", f"{widest:.1e}", f"{ms:.1f}"
 
 
-def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
+def _compute_enclosures(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
     """Return interval results of random motions, and the processor time (ms) per motion."""
     found, times = [], []
     for seed in (0, *range(count)):  # The first motion is not timed.
@@ -264,7 +266,7 @@ def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosur
     return found[1:], 1e3 * sum(times[1:]) / count
 
 
-def askew(length: int) -> str:
+def make_askew_chain(length: int) -> str:
     joints = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
         f'<child link="l{i + 1}"/><origin xyz="0.1 0.2 0.3" rpy="1.5708 0.3 -0.2"/>'
@@ -275,34 +277,34 @@ def askew(length: int) -> str:
 
 
 PARTS: dict[str, Callable[[], dict[str, str]]] = {
-    "findings": findings,
-    "reports": reports,
-    "accuracy": study,
-    "enclosures": enclosures,
+    "findings": make_findings_parts,
+    "reports": make_reports_parts,
+    "accuracy": make_accuracy_parts,
+    "enclosures": make_enclosures_parts,
 }
 PAGES = ("equations", "performance", *PARTS)
 FIGURES, PICTURE = DOCS / "performance.json", DOCS / "images" / "performance.svg"
 
 
-def path_of(name: str) -> Path:
+def page_path(name: str) -> Path:
     return DOCS / f"{name}.md"
 
 
-def page(name: str) -> str:
+def make_page(name: str) -> str:
     if name == "equations":
         return equations_page()
-    text = path_of(name).read_text("utf-8")
+    text = page_path(name).read_text("utf-8")
     if name == "performance":
-        return tables.page(text, json.loads(FIGURES.read_text("utf-8")))
-    return inserted(text, **PARTS[name]())
+        return tables.make_page(text, json.loads(FIGURES.read_text("utf-8")))
+    return insert_parts(text, **PARTS[name]())
 
 
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("pages", nargs="*", choices=[*PAGES, []], metavar="PAGE", help="default: all pages")
     for name in parser.parse_args(words).pages or PAGES:
-        path_of(name).write_text(page(name), "utf-8")
-        print(path_of(name))
+        page_path(name).write_text(make_page(name), "utf-8")
+        print(page_path(name))
         if name == "performance":
             PICTURE.write_bytes(draw(json.loads(FIGURES.read_text("utf-8")), PICTURE))
 

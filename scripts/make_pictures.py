@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image
 
 import urdfkin
-from scripts.make_tour import IMAGES, INK, QUIET, STYLE, arrow
+from scripts.make_tour import IMAGES, INK, QUIET, STYLE, draw_arrow
 from tests.report.browser import Browser, opened
 from urdfkin.report.html import as_html
 from urdfkin.view.figure import GREEN, VERMILION
@@ -30,7 +30,7 @@ POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
 THEMES = (("", False), ("-dark", True))
 
 
-def reference_frames() -> Any:
+def draw_reference_frames() -> Any:
     """Draw the planar arm of docs/reference-frames.md, with a panel for each reference frame."""
     arm, q, v = urdfkin.load("planar_two_link"), [0.0, np.pi / 2], [1.0, 1.0]
     figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.6), sharey=True, layout="constrained")
@@ -47,11 +47,11 @@ def reference_frames() -> Any:
         if reference == "world":
             axes.plot(*np.array([tip, at]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
         for k, color in enumerate((VERMILION, GREEN)):
-            arrow(axes, at, 0.17 * R[:, k], color)
+            draw_arrow(axes, at, 0.17 * R[:, k], color)
             place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
             axes.text(*place, "xy"[k], color=color, ha="center", va="center", fontsize=9)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
-        arrow(axes, at, 0.6 * R @ numbers, INK)
+        draw_arrow(axes, at, 0.6 * R @ numbers, INK)
         for k, color in enumerate((VERMILION, GREEN)):
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
             ends = np.array([begin, begin + 0.6 * R[:, k] * numbers[k]])
@@ -74,7 +74,7 @@ def photograph_report(folder: Path) -> None:
             browser.open(page)
             browser.js("document.querySelector('details.robot').open = true; scrollTo(0, 0)")
             browser.settle()
-            keep(browser, f"report{theme}")
+            save_screenshot(browser, f"report{theme}")
 
 
 def photograph_viewer(folder: Path) -> None:
@@ -97,19 +97,19 @@ def photograph_viewer(folder: Path) -> None:
                 # Drawing takes seconds, so stop after the current picture.
                 browser.js("window.requestAnimationFrame = () => 0")
                 time.sleep(2)
-                keep(browser, f"{name}{theme}")
+                save_screenshot(browser, f"{name}{theme}")
     finally:
         server.stop()
 
 
-def keep(browser: Browser, name: str) -> None:
+def save_screenshot(browser: Browser, name: str) -> None:
     image = Image.open(io.BytesIO(browser.chrome.get_screenshot_as_png())).convert("RGB")
     image.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
 
 
 if __name__ == "__main__":
     with mpl.rc_context(STYLE):
-        figure = reference_frames()
+        figure = draw_reference_frames()
         figure.savefig(IMAGES / "reference-frames.svg", metadata={"Date": None})
         plt.close(figure)
     with tempfile.TemporaryDirectory() as folder:

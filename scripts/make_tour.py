@@ -45,18 +45,20 @@ STYLE: Any = {
 }
 
 
-def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None) -> None:
+def draw_arrow(
+    axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None
+) -> None:
     units: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1}
     axes.quiver(*start, *vector, color=color, width=0.007, zorder=4, label=label, **units)
 
 
-def plane(axes: Any, title: str) -> None:
+def label_plane(axes: Any, title: str) -> None:
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.set(aspect="equal", title=title, xlabel="x0 [m]", ylabel="y0 [m]")
 
 
-def one_link(figure: Any) -> None:
+def draw_one_link(figure: Any) -> None:
     """Draw a rotating link and its endpoint's velocity (figure 7.1)."""
     axes = figure.subplots()
     a1, rate = 0.8, 1.2
@@ -65,13 +67,13 @@ def one_link(figure: Any) -> None:
     for theta, ink in ((0.3, "#c3ccd6"), (1.1, "#8fa0b3"), (2.0, INK)):
         tip = link_endpoint(theta, a1)
         axes.plot([0, tip[0]], [0, tip[1]], color=ink, linewidth=5, solid_capstyle="round")
-        arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), VERMILION)
+        draw_arrow(axes, tip, 0.4 * link_endpoint_velocity(theta, rate, a1), VERMILION)
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-1.1, 1.15), ylim=(-0.95, 1.3))
-    plane(axes, "7.2: the endpoint's velocity along y1\nis a1 times the joint velocity")
+    label_plane(axes, "7.2: the endpoint's velocity along y1\nis a1 times the joint velocity")
 
 
-def velocity_field(figure: Any) -> None:
+def draw_velocity_field(figure: Any) -> None:
     """Draw the velocity field w x p of a rotating body, in a plane that is not perpendicular to the axis."""
     axes = figure.add_subplot(projection="3d")
     k = np.array([1.0, 0.4, 2.0]) / np.linalg.norm([1.0, 0.4, 2.0])
@@ -93,7 +95,7 @@ def velocity_field(figure: Any) -> None:
     axes.set_title("7.21: the velocity of every point is w x p")
 
 
-def integral_of_w(figure: Any) -> None:
+def draw_integral_of_w(figure: Any) -> None:
     """Draw two different orientations with the same integral of w (example 7.3 and figure 7.9)."""
     cases = (("case 1: about x0, then about y0", (0, 1)), ("case 2: about y0, then about x0", (1, 0)))
     times = np.linspace(0.0, 2.0, 201)
@@ -121,7 +123,7 @@ def integral_of_w(figure: Any) -> None:
             axes.set_title(f"{title}\nt = 0" if column == 0 else f"t = {column}", fontsize=9)
 
 
-def euler_singularity(figure: Any) -> None:
+def plot_euler_singularity(figure: Any) -> None:
     """Plot the condition number of Omega (angle rates to angular velocity) against the middle angle."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
@@ -137,7 +139,7 @@ def euler_singularity(figure: Any) -> None:
     axes.set_title("7.56: singularities of Euler angle rates")
 
 
-def convergence(figure: Any) -> None:
+def plot_convergence(figure: Any) -> None:
     """Plot the error of the integrated quaternion against the step size."""
 
     def angles(t: float) -> FloatArray:
@@ -164,7 +166,7 @@ def convergence(figure: Any) -> None:
     axes.set_title("Integration of equation 7.57: half the step gives 1/16 of the error")
 
 
-def acceleration_parts(figure: Any) -> None:
+def draw_acceleration_parts(figure: Any) -> None:
     """Draw a point that slides on a rotating arm, and its acceleration (7.125)."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
@@ -179,25 +181,25 @@ def acceleration_parts(figure: Any) -> None:
     at = tip
     for name, color in names:
         vector = 0.35 * getattr(parts, name)
-        arrow(axes, at[:2], vector[:2], color, name)
-        _named(axes, at + 0.5 * vector, vector if name in ("transverse", "relative") else -vector, name)
+        draw_arrow(axes, at[:2], vector[:2], color, name)
+        _write_name(axes, at + 0.5 * vector, vector if name in ("transverse", "relative") else -vector, name)
         at = at + vector
-    arrow(axes, tip[:2], 0.35 * parts.total[:2], INK, "the sum")
-    _named(axes, tip + 0.09 * parts.total, -parts.total, "the sum")
+    draw_arrow(axes, tip[:2], 0.35 * parts.total[:2], INK, "the sum")
+    _write_name(axes, tip + 0.09 * parts.total, -parts.total, "the sum")
     axes.plot(*tip[:2], "o", color=INK, markersize=8, zorder=5)
     axes.plot(0, 0, "o", color=INK, markersize=8)
     axes.set(xlim=(-0.75, 1.45), ylim=(-0.2, 1.75))
-    plane(axes, "7.125: the terms of a slider's acceleration, and their sum")
+    label_plane(axes, "7.125: the terms of a slider's acceleration, and their sum")
 
 
-def _named(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
+def _write_name(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
     """Write a name to the right of an arrow, so that readers need not rely on the arrow's colour."""
     side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     place = at[:2] + 0.04 * side
     axes.text(*place, name, ha="left" if side[0] > 0.0 else "right", va="center", fontsize=9)
 
 
-def two_link(figure: Any) -> None:
+def draw_two_link(figure: Any) -> None:
     axes = figure.subplots()
     robot = urdfkin.load("planar_two_link")
     poses = np.array([[0.15, 0.35], [0.5, 1.0], [0.75, 1.7], [0.9, 2.5]])
@@ -208,12 +210,12 @@ def two_link(figure: Any) -> None:
         ellipse = joints[-1][:, np.newaxis] + 0.22 * robot.jacobian(q, "tip")[:2] @ circle
         axes.plot(*ellipse, color=PURPLE, linewidth=1.4, zorder=3)
         velocity = 0.22 * robot.velocity(q, [0.6, 0.8], "tip")[:2]
-        arrow(axes, joints[-1], velocity, VERMILION)
+        draw_arrow(axes, joints[-1], velocity, VERMILION)
     axes.set(xlim=(-0.25, 1.1), ylim=(-0.1, 0.95))
-    plane(axes, "7.90: the tip's velocities for joint velocities of norm 1")
+    label_plane(axes, "7.90: the tip's velocities for joint velocities of norm 1")
 
 
-def breakdown(figure: Any) -> None:
+def plot_breakdown(figure: Any) -> None:
     robot = urdfkin.load("elbow")
     q, v = [0.4, 0.5, 0.7, 0.3, 0.6, 0.2], [1.0, 0.8, -1.2, 2.0, 1.0, -1.0]
     parts = robot.acceleration_breakdown(q, v, [0.5, 1.0, -0.5, 1.0, 1.0, 1.0], "tool")
@@ -240,14 +242,14 @@ def breakdown(figure: Any) -> None:
 
 
 PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {
-    "one-link": (one_link, (5.2, 5.0)),
-    "velocity-field": (velocity_field, (5.6, 5.2)),
-    "integral-of-w": (integral_of_w, (7.6, 5.2)),
-    "euler-singularity": (euler_singularity, (6.2, 3.8)),
-    "convergence": (convergence, (5.6, 3.9)),
-    "acceleration-parts": (acceleration_parts, (5.6, 5.4)),
-    "two-link": (two_link, (5.8, 4.9)),
-    "breakdown": (breakdown, (8.2, 3.9)),
+    "one-link": (draw_one_link, (5.2, 5.0)),
+    "velocity-field": (draw_velocity_field, (5.6, 5.2)),
+    "integral-of-w": (draw_integral_of_w, (7.6, 5.2)),
+    "euler-singularity": (plot_euler_singularity, (6.2, 3.8)),
+    "convergence": (plot_convergence, (5.6, 3.9)),
+    "acceleration-parts": (draw_acceleration_parts, (5.6, 5.4)),
+    "two-link": (draw_two_link, (5.8, 4.9)),
+    "breakdown": (plot_breakdown, (8.2, 3.9)),
 }
 
 

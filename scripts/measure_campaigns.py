@@ -1,7 +1,7 @@
 """Measure the cost of a validation run: in one process, with stored results, in two processes, in a cluster.
 
     python scripts/measure_campaigns.py ur5 --samples 10000 --rounds 3
-    python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --ways serial,jobs
+    python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --engines serial,jobs
     python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of samples
 
 The variants alternate, so that other load of the machine affects all of them. The script prints medians
@@ -27,7 +27,7 @@ from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.validation.store import Manifest, open_store
 
 
-def store(*robots: Any, **how: Any) -> ValidationReport:
+def validate_with_store(*robots: Any, **how: Any) -> ValidationReport:
     with tempfile.TemporaryDirectory() as folder:
         report = validate(*robots, store=folder, **how)
         files = [path.stat().st_size for path in Path(folder).glob("chunks/*/*")]
@@ -35,7 +35,7 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
         return report
 
 
-def cluster(*robots: Any, **how: Any) -> ValidationReport:
+def validate_on_cluster(*robots: Any, **how: Any) -> ValidationReport:
     """Validate with two local Dask workers; print the time without the start and the end of the workers."""
     with connect_cluster("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
@@ -51,35 +51,35 @@ def cluster(*robots: Any, **how: Any) -> ValidationReport:
         return report
 
 
-WAYS: dict[str, Callable[..., ValidationReport]] = {
+ENGINES: dict[str, Callable[..., ValidationReport]] = {
     "serial": validate,
-    "store": store,
+    "store": validate_with_store,
     "jobs": lambda *robots, **how: validate(*robots, jobs=2, **how),
-    "cluster": cluster,
+    "cluster": validate_on_cluster,
 }
 
 
-def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> None:
+def measure(robots: list[str], engines: list[str], samples: int, rounds: int) -> None:
     validate("planar_two_link", samples=10)  # compile and load all kernels before the measurement
-    wall: dict[str, list[float]] = {name: [] for name in ways}
-    processor: dict[str, list[float]] = {name: [] for name in ways}
-    for name in ways * rounds:
+    wall: dict[str, list[float]] = {name: [] for name in engines}
+    processor: dict[str, list[float]] = {name: [] for name in engines}
+    for name in engines * rounds:
         begin, before = time.perf_counter(), sum(os.times()[:4])  # includes finished child processes
-        report = WAYS[name](robots, samples=samples)
+        report = ENGINES[name](robots, samples=samples)
         wall[name].append(time.perf_counter() - begin)
         processor[name].append(sum(os.times()[:4]) - before)
         results = sum(robot.results for robot in report.robots)
         print(f"  {name}: {wall[name][-1]:.1f} s, processor {processor[name][-1]:.1f} s", flush=True)
     print(f"{len(robots)} robots, {samples:,} samples each, {results:,} results; {rounds} rounds")
-    for name in ways:
+    for name in engines:
         a_second = [results / median(seconds[name]) for seconds in (wall, processor)]
-        share = median(p / s for p, s in zip(processor[name], processor[ways[0]], strict=True))
+        share = median(p / s for p, s in zip(processor[name], processor[engines[0]], strict=True))
         print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} per processor second;", end=" ")
-        print(f"processor time {share:.3f} of {ways[0]}")
+        print(f"processor time {share:.3f} of {engines[0]}")
 
 
 def measure_chunk() -> None:
-    def cost(work: Callable[[int], object], times: int = 100) -> float:
+    def measure_cost(work: Callable[[int], object], times: int = 100) -> float:
         moments = [time.process_time()]
         for i in range(times):
             work(i)
@@ -89,12 +89,12 @@ def measure_chunk() -> None:
     robot, cut = make_robot_input("ur5"), Chunking(100_000)
     chunk = cut.chunk(robot, 0, 1)
     found = run_chunk(chunk)
-    print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
+    print(f"a chunk of {chunk.configurations} samples: {measure_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
-        print(f"time to store it: {cost(lambda i: kept.write_answer(0, i, found)):.2f} ms")
-        print(f"time to read it: {cost(lambda i: kept.read_answer(0, i)):.2f} ms")
-    print(f"time to add two: {cost(lambda _: found + found):.2f} ms")
+        print(f"time to store it: {measure_cost(lambda i: kept.write_answer(0, i, found)):.2f} ms")
+        print(f"time to read it: {measure_cost(lambda i: kept.read_answer(0, i)):.2f} ms")
+    print(f"time to add two: {measure_cost(lambda _: found + found):.2f} ms")
 
 
 if __name__ == "__main__":
@@ -103,11 +103,11 @@ if __name__ == "__main__":
     parser.add_argument("--all", action="store_true", help="the robots of example-robot-data")
     parser.add_argument("--samples", type=int, default=10_000)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--ways", default=",".join(WAYS), help=f"default: {','.join(WAYS)}")
+    parser.add_argument("--engines", default=",".join(ENGINES), help=f"default: {','.join(ENGINES)}")
     parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk of samples")
-    given = parser.parse_args()
-    if given.chunk:
+    options = parser.parse_args()
+    if options.chunk:
         measure_chunk()
     else:
-        robots = list(example_robots()) if given.all else given.robots
-        measure(robots, given.ways.split(","), given.samples, given.rounds)
+        robots = list(example_robots()) if options.all else options.robots
+        measure(robots, options.engines.split(","), options.samples, options.rounds)

@@ -35,7 +35,7 @@ _UNFOLD = """
 """
 
 
-def fleet(robots: int) -> Document:
+def make_report(robots: int) -> Document:
     """Return a report of `robots` robots: the results of a few robots, under many names."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     few = islice(cycle(document["robots"]), robots)
@@ -44,7 +44,7 @@ def fleet(robots: int) -> Document:
     return document
 
 
-def measured(page: Path, profile: Path, robots: int) -> dict[str, float]:
+def measure_page(page: Path, profile: Path, robots: int) -> dict[str, float]:
     with opened(profile) as browser:
         browser.chrome.get("about:blank")
         browser.open(page)
@@ -61,17 +61,19 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=5)
-    given = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         page, begin = Path(folder) / "fleet.html", time.process_time()
         (page.parent / "fleet-robots").mkdir()
         sizes = [
             (page.parent / place).write_text(text, encoding="utf-8")
-            for place, text in as_files(fleet(given.robots), page.name)
+            for place, text in as_files(make_report(options.robots), page.name)
         ]
         print(f"written: {time.process_time() - begin:.1f} s of processor time, {len(sizes)} files,", end=" ")
         print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB in total")
-        rounds = [measured(page, Path(folder) / f"profile-{i}", given.robots) for i in range(given.rounds)]
+        rounds = [
+            measure_page(page, Path(folder) / f"profile-{i}", options.robots) for i in range(options.rounds)
+        ]
     for name in rounds[0]:
         print(f"{name}: {median(times[name] for times in rounds):.0f} ms", end=" ")
         print(f"({', '.join(f'{times[name]:.0f}' for times in rounds)})")

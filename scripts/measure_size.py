@@ -12,14 +12,14 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from scripts.pages import DOCS, insert, table
+from scripts.pages import DOCS, table, update_page
 
 ROOT = Path(__file__).parents[1]
 PAGE = DOCS / "install.md"
 EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
-def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
+def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
     """Return the sizes (bytes) of a package and its dependencies.
 
     The result contains neither the package named by `without` nor packages that only this package needs.
@@ -42,35 +42,37 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
     return found
 
 
-def own() -> int:
+def measure_wheel() -> int:
     """Return the size (bytes) of urdfkin's unpacked wheel."""
     places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
     files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
 
 
-def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
+def make_section(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
     total, meshes = sum(core.values()), sum(core.values()) - sum(lean.values())
-    robots, pinocchio = core["example-robot-data"], sum(closure("pin").values())
+    robots, pinocchio = core["example-robot-data"], sum(measure_packages("pin").values())
     text = (
         f"An installation has {len(core)} packages and takes {total / 1e9:.1f} GB:"
         f" {robots / 1e9:.2f} GB for the robots of\nexample-robot-data, {pinocchio / 1e9:.2f} GB for"
         " Pinocchio and its libraries, and the rest mostly for NumPy, Numba and its\ncompiler."
         f" {len(core) - len(lean)} packages ({meshes / 1e6:.0f} MB) come only with yourdfpy, which needs"
         " `trimesh[easy]`. A job that only\n[checks files](ci.md) needs only urdfkin and click,"
-        f" together {(own() + core['click']) / 1e6:.0f} MB.\n\n"
+        f" together {(measure_wheel() + core['click']) / 1e6:.0f} MB.\n\n"
     )
     rows = [(f"`[{name}]`", count, f"{size / 1e6:.0f} MB") for name, (count, size) in extras.items()]
     return text + table(("extra", "additional packages", "size"), rows)
 
 
 if __name__ == "__main__":
-    core = closure("urdfkin") | {"urdfkin": own()}
-    lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
+    core = measure_packages("urdfkin") | {"urdfkin": measure_wheel()}
+    lean = measure_packages("urdfkin", without="yourdfpy") | {"urdfkin": measure_wheel()}
     extras = {}
     for extra in EXTRAS:
-        added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
+        added = {
+            name: size for name, size in measure_packages("urdfkin", [extra]).items() if name not in core
+        }
         if not added:
             sys.exit(f"the page is not written: install urdfkin again with the extra {extra}")
         extras[extra] = (len(added), sum(added.values()))
-    insert(PAGE, size=sentences(core, lean, extras))
+    update_page(PAGE, size=make_section(core, lean, extras))

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scripts.pages import DOCS, insert, table
+from scripts.pages import DOCS, table, update_page
 
 ROOT = Path(__file__).parents[1]
 PAGE = DOCS / "performance.md"
@@ -31,10 +31,10 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 
 @dataclass(frozen=True)
 class Row:
-    what: str  # name of the process on the page
-    words: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
-    most: float = math.inf  # limit of the time, as a multiple of the time of `import numpy, pinocchio`
-    fresh: bool = False  # whether the process starts with an empty kernel cache
+    name: str  # name of the process on the page
+    arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
+    max_ratio: float = math.inf  # limit of the time, as a multiple of the time of `import numpy, pinocchio`
+    empty_cache: bool = False  # whether the process starts with an empty kernel cache
 
 
 _JACOBIAN = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")
@@ -44,19 +44,19 @@ ROWS = (
     Row("`urdfkin --help`", ("-c", _COMMAND, "--help")),
     Row("`urdfkin info MY.urdf`", ("-c", _COMMAND, "info", "ROBOT"), 1.3),
     Row("`urdfkin jacobian MY.urdf --q random`", _JACOBIAN, 2.0),
-    Row("`urdfkin jacobian MY.urdf --q random`, empty kernel cache", _JACOBIAN, 2.5, fresh=True),
+    Row("`urdfkin jacobian MY.urdf --q random`, empty kernel cache", _JACOBIAN, 2.5, empty_cache=True),
     Row("`urdfkin same panda panda`", ("-c", _COMMAND, "same", "panda", "panda"), 2.5),
     Row("`import urdfkin`, `load`, `jacobian` in Python", ("-c", _NOTEBOOK, "ROBOT"), 2.0),
     Row(
         "`import urdfkin`, `load`, `jacobian` in Python, empty kernel cache",
         ("-c", _NOTEBOOK, "ROBOT"),
         2.5,
-        fresh=True,
+        empty_cache=True,
     ),
 )
 
 
-def seconds(words: Sequence[str], cache: Path | None) -> float:
+def measure_seconds(words: Sequence[str], cache: Path | None) -> float:
     environ = {name: x for name, x in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environ["PYTHONPATH"] = str(ROOT)
     if cache is not None:
@@ -67,33 +67,38 @@ def seconds(words: Sequence[str], cache: Path | None) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def medians(rounds: int, folder: Path) -> list[float]:
+def measure_medians(rounds: int, folder: Path) -> list[float]:
     """Return the median processor time (s) of each row. The first round only writes bytecode files."""
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     found: list[list[float]] = [[] for _ in ROWS]
     for k in range(rounds + 1):
         for i, row in enumerate(ROWS):
-            words = [str(robot) if word == "ROBOT" else word for word in row.words]
-            found[i].append(seconds(words, folder / f"{k}-{i}" if row.fresh else None))
+            words = [str(robot) if word == "ROBOT" else word for word in row.arguments]
+            found[i].append(measure_seconds(words, folder / f"{k}-{i}" if row.empty_cache else None))
     return [statistics.median(times[1:]) for times in found]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
-    given = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        found = medians(given.rounds, Path(folder))
+        found = measure_medians(options.rounds, Path(folder))
     rows = [
-        (row.what, f"{x:.2f}", f"{x / found[0]:.2f}", f"{row.most:.1f}" if math.isfinite(row.most) else "")
+        (
+            row.name,
+            f"{x:.2f}",
+            f"{x / found[0]:.2f}",
+            f"{row.max_ratio:.1f}" if math.isfinite(row.max_ratio) else "",
+        )
         for row, x in zip(ROWS, found, strict=True)
     ]
     heads = ("", "processor time, s", "ratio to the first row", "allowed ratio")
     figures = table(heads, rows, left=1)
     print(figures)
-    insert(PAGE, start=figures)
-    slow = [row.what for row, x in zip(ROWS, found, strict=True) if x > row.most * found[0]]
+    update_page(PAGE, start=figures)
+    slow = [row.name for row, x in zip(ROWS, found, strict=True) if x > row.max_ratio * found[0]]
     print(*(f"too slow: {what}" for what in slow), sep="\n", file=sys.stderr)
     return int(bool(slow))
 

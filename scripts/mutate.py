@@ -34,7 +34,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.mutating.operators import changes_of, function_at
+from scripts.mutating.operators import function_at, list_changes
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
@@ -49,7 +49,7 @@ COMPILED = {
 }  # fmt: skip
 
 
-def files(parts: list[str]) -> list[Path]:
+def find_files(parts: list[str]) -> list[Path]:
     below = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
@@ -60,41 +60,41 @@ def files(parts: list[str]) -> list[Path]:
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 
 
-def module_of(path: Path) -> str:
+def module_name(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
 @cache
-def _texts() -> dict[Path, str]:
+def _read_tests() -> dict[Path, str]:
     own = ("test_mutate", "test_named_mutants")  # These tests make their own mutants.
     tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in own)
     return {path: path.read_text(encoding="utf-8") for path in tests}
 
 
-def near_tests(path: Path) -> list[str]:
+def find_near_tests(path: Path) -> list[str]:
     """Return the tests that mention a module, and the tests of the module's package.
 
     If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
     """
-    package, _, name = module_of(path).rpartition(".")
+    package, _, name = module_name(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
     near = {
         test
-        for test, text in _texts().items()
+        for test, text in _read_tests().items()
         if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
     }
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     for parts in ((part, f"test_{part}.py"), ("test_robot.py", "verify", "laws")):
-        if own := {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}:
+        if own := {test for test in _read_tests() if test.relative_to(TESTS).parts[0] in parts}:
             break
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedMutant:
     claim: str  # the mistake that must be detected
     function: str  # such as `urdfkin.dh.snapping.snap_report`; a module for code outside functions
     before: str  # code that occurs exactly once in the function
@@ -114,17 +114,17 @@ class Named:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """The function's name in the file, the code, and its replacement: the arguments of `replaced`."""
-        return self.function[len(module_of(self.file)) + 1 :], self.before, self.after
+        """The function's name in the file, the code, and its replacement: the arguments of `replace_code`."""
+        return self.function[len(module_name(self.file)) + 1 :], self.before, self.after
 
 
-def named_mutants() -> list[Named]:
+def named_mutants() -> list[NamedMutant]:
     text = (TESTS / "attacks" / "named_mutants.toml").read_text(encoding="utf-8")
-    return [Named(**mutant) for mutant in tomllib.loads(text)["mutant"]]
+    return [NamedMutant(**mutant) for mutant in tomllib.loads(text)["mutant"]]
 
 
 @cache
-def argued() -> dict[tuple[str, str], str]:
+def harmless_mutants() -> dict[tuple[str, str], str]:
     """Map each harmless mutant, by function and text, to the reason."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
@@ -137,63 +137,63 @@ class Mutant:
     name: str  # name for --only
     file: str
     line: int
-    what: str  # the text before and after
-    place: str  # the function that contains the mutant; line numbers change more often than this name
+    change: str  # the text before and after
+    function: str  # the function that contains the mutant; line numbers change more often than this name
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a mutant: `noticed` by a test, `survived`, `too slow`, or `argued` to be harmless."""
+    """The result of a mutant: `detected` by a test, `survived`, `too slow`, or `harmless`."""
 
     mutant: Mutant
-    word: str
-    by: str
+    result: str
+    detail: str
 
 
-def mutants(parts: list[str]) -> list[Mutant]:
+def list_mutants(parts: list[str]) -> list[Mutant]:
     found = []
-    for path in files(parts):
+    for path in find_files(parts):
         tree, module, file = (
             ast.parse(path.read_text(encoding="utf-8")),
-            module_of(path),
+            module_name(path),
             path.relative_to(ROOT),
         )
-        for number, change in enumerate(changes_of(tree)):
+        for number, change in enumerate(list_changes(tree)):
             place = ".".join(filter(None, (module, function_at(tree, change.line))))
-            found.append(Mutant(f"{module}:{number}", str(file), change.line, change.what, place))
+            found.append(Mutant(f"{module}:{number}", str(file), change.line, change.text, place))
     return found
 
 
 def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
-    if (mutant.place, mutant.what) in argued():
-        return Outcome(mutant, "argued", "docs/mutation.md")
-    near = near_tests(ROOT / mutant.file)
+    if (mutant.function, mutant.change) in harmless_mutants():
+        return Outcome(mutant, "harmless", "docs/mutation.md")
+    near = find_near_tests(ROOT / mutant.file)
     rounds = [(near, _QUICK), *([(near, _SLOW)] if slow else []), *([(["tests"], _QUICK)] if whole else [])]
     for tests, marks in rounds:
-        word, by = _run({"URDFKIN_MUTANT": mutant.name}, [*tests, "-m", marks], timeout)
-        if word != "survived":
+        result, detail = _run_in_process({"URDFKIN_MUTANT": mutant.name}, [*tests, "-m", marks], timeout)
+        if result != "survived":
             break
-    return Outcome(mutant, word, by)
+    return Outcome(mutant, result, detail)
 
 
-def evaluate_named(named: Named, *, timeout: float) -> Outcome:
-    change = {"URDFKIN_MUTANT": module_of(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
-    word, by = _run(change, [named.test], timeout)
-    if word == "noticed" and not by.startswith(f"FAILED {named.test}"):
-        word = "not run"  # The test failed, but not because of the mutant.
+def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
+    change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
+    result, detail = _run_in_process(change, [named.test], timeout)
+    if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
+        result = "not run"  # The test failed, but not because of the mutant.
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
-    return Outcome(mutant, word, by)
+    return Outcome(mutant, result, detail)
 
 
 #: The fork server imports the foreign libraries once, because this takes longer than most tests.
-_READY = multiprocessing.get_context("forkserver")
-_READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
+_FORK_SERVER = multiprocessing.get_context("forkserver")
+_FORK_SERVER.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
 
-def _run(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
+def _run_in_process(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
     with tempfile.NamedTemporaryFile("r") as output:
-        process = _READY.Process(target=_ask, args=(change, tests, output.name))
+        process = _FORK_SERVER.Process(target=_run_tests, args=(change, tests, output.name))
         process.start()
         process.join(timeout)
         if process.exitcode is None:
@@ -204,10 +204,10 @@ def _run(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str,
     if process.exitcode in (0, _NO_TESTS):
         return "survived", ""
     failed = (line for line in lines if line.startswith(("FAILED", "ERROR")))
-    return "noticed", next(failed, lines[-1] if lines else "")[:300]
+    return "detected", next(failed, lines[-1] if lines else "")[:300]
 
 
-def _ask(change: dict[str, str], tests: list[str], output: str) -> None:
+def _run_tests(change: dict[str, str], tests: list[str], output: str) -> None:
     """Run the tests on a mutant in this process and its children, and exit with pytest's code."""
     import pytest
 
@@ -242,35 +242,35 @@ def main() -> int:
     option("--count", action="store_true", help="print the number of mutants and exit")
     options = parser.parse_args()
     try:
-        modules = {module_of(path) for path in files(options.parts)}
+        modules = {module_name(path) for path in find_files(options.parts)}
     except ValueError as error:
         parser.error(str(error))
-    asks: list[Callable[[], Outcome]]
+    runs: list[Callable[[], Outcome]]
     if options.named:
-        named = [one for one in named_mutants() if not options.parts or module_of(one.file) in modules]
-        asks = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
+        named = [one for one in named_mutants() if not options.parts or module_name(one.file) in modules]
+        runs = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
     else:
-        chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]
+        chosen = [mutant for mutant in list_mutants(options.parts) if options.only in (None, mutant.name)]
         if options.sample is not None and options.sample < len(chosen):
             chosen = random.Random(options.seed).sample(chosen, options.sample)
         how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-        asks = [partial(evaluate, mutant, **how) for mutant in chosen]
-    if not asks:
+        runs = [partial(evaluate, mutant, **how) for mutant in chosen]
+    if not runs:
         print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1
     if options.count:
-        print(len(asks))
+        print(len(runs))
         return 0
     counts = Counter[str]()
     with ThreadPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(lambda ask: ask(), asks):
-            counts[outcome.word] += 1
-            if outcome.word != "noticed":
+        for outcome in pool.map(lambda run: run(), runs):
+            counts[outcome.result] += 1
+            if outcome.result != "detected":
                 mutant = outcome.mutant
-                where = f"{mutant.place}:{mutant.line}: {mutant.what}  [{mutant.name}]"
-                print(f"{outcome.word}: {where}", flush=True)
-    print(f"{len(asks)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
-    return 0 if counts.keys() <= {"noticed", "argued"} else 1
+                where = f"{mutant.function}:{mutant.line}: {mutant.change}  [{mutant.name}]"
+                print(f"{outcome.result}: {where}", flush=True)
+    print(f"{len(runs)} mutants: " + ", ".join(f"{n} {result}" for result, n in counts.most_common()))
+    return 0 if counts.keys() <= {"detected", "harmless"} else 1
 
 
 if __name__ == "__main__":

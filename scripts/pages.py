@@ -7,10 +7,10 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
-def inserted(page: str, **parts: str) -> str:
+def insert_parts(page: str, **parts: str) -> str:
     """Return a page with the given parts; a part must have exactly one place.
 
-    >>> print(inserted("before <!-- size --> old <!-- end --> after", size="new"))
+    >>> print(insert_parts("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->
     new
     <!-- end --> after
@@ -24,8 +24,8 @@ def inserted(page: str, **parts: str) -> str:
     return page
 
 
-def insert(path: Path, **parts: str) -> None:
-    path.write_text(inserted(path.read_text("utf-8"), **parts), "utf-8")
+def update_page(path: Path, **parts: str) -> None:
+    path.write_text(insert_parts(path.read_text("utf-8"), **parts), "utf-8")
     print(path)
 
 

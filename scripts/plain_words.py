@@ -75,7 +75,7 @@ def passages(paths: list[Path]) -> Iterator[Passage]:
                 yield Passage(str(name), token.start[0], token.string.lstrip("#: "))
 
 
-def complaints(paths: list[Path]) -> list[str]:
+def find_words(paths: list[Path]) -> list[str]:
     found = []
     for passage in passages(paths):
         for pattern, plain in PLAIN.items():
@@ -85,7 +85,7 @@ def complaints(paths: list[Path]) -> list[str]:
     return found
 
 
-def long_sentences(paths: list[Path]) -> list[str]:
+def find_long_sentences(paths: list[Path]) -> list[str]:
     found = []
     for passage in passages(paths):
         for sentence in re.split(r"(?<=[.!?:;])\s+|\n\s*\n", passage.text):
@@ -102,6 +102,6 @@ if __name__ == "__main__":
     parser.add_argument("--long", action="store_true", help="list long sentences instead")
     options = parser.parse_args()
     chosen = [path.resolve() for path in options.paths]
-    lines = long_sentences(chosen) if options.long else complaints(chosen)
+    lines = find_long_sentences(chosen) if options.long else find_words(chosen)
     print("\n".join(lines))
     sys.exit(bool(lines) and not options.long)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 
-def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
+def error_ratios(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
     """Yield each check's largest error as a share of its bound."""
     scope = runpy.run_path(path)
     if library == "jax":
@@ -33,16 +33,16 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
     for (_, kind), share in checked.items():
         yield f"{name} {kind}", share
     if "hessian" in scope["TRUE"]:
-        yield f"{name} gradient", of_hessian(scope, library)
+        yield f"{name} gradient", check_hessian(scope, library)
     if any_library:
         return
     for good in scope.get("gradients", dict)().values():
         yield "gradcheck", 0.0 if good else float("inf")
     if compiled and library == "torch":
-        yield "torch.compile", of_compiled(scope)
+        yield "torch.compile", check_compiled(scope)
 
 
-def of_hessian(scope: dict[str, Any], library: str) -> float:
+def check_hessian(scope: dict[str, Any], library: str) -> float:
     if library == "torch":
         import torch
 
@@ -53,10 +53,10 @@ def of_hessian(scope: dict[str, Any], library: str) -> float:
 
         q, slopes = jax.numpy.array(scope["GIVEN"]["q"]), jax.vmap(jax.jacrev(scope["jacobian"]))
     found = slopes(q).reshape(len(q), -1).tolist()
-    return worst(found, scope["TRUE"]["hessian"], scope["WITHIN"]["hessian"], 2.0**-52)
+    return max_error_ratio(found, scope["TRUE"]["hessian"], scope["WITHIN"]["hessian"], 2.0**-52)
 
 
-def of_compiled(scope: dict[str, Any]) -> float:
+def check_compiled(scope: dict[str, Any]) -> float:
     import torch
 
     found = 0.0
@@ -67,12 +67,12 @@ def of_compiled(scope: dict[str, Any]) -> float:
         inputs = [scope["GIVEN"][letter] for letter in letters]
         for kind, eps, table in (("float64", 2.0**-52, "WITHIN"), ("float32", 2.0**-23, "SINGLE")):
             values = scope["_values"](compiled, inputs, kind, "cpu")
-            share = worst(values, scope["TRUE"][name], scope[table][name], eps)
+            share = max_error_ratio(values, scope["TRUE"][name], scope[table][name], eps)
             found = found if share <= found else share
     return found
 
 
-def worst(found: Any, true: Any, within: Any, eps: float) -> float:
+def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
     """Return the largest ratio of a row's error to its bound; NaN counts as the largest number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
@@ -88,7 +88,7 @@ def main(library: str, paths: list[str]) -> None:
     compiled = True
     for path in paths:
         found: dict[str, float] = {}
-        for name, share in shares(path, library, compiled):
+        for name, share in error_ratios(path, library, compiled):
             found[name] = share if not share <= found.get(name, 0.0) else found.get(name, 0.0)
         compiled = compiled and not path.endswith("_torch.py")
         print(json.dumps({"file": Path(path).stem, "library": library, **found}), flush=True)

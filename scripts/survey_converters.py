@@ -107,10 +107,10 @@ class RefusalError(Exception):
     """A converter refuses a robot, or its result cannot be compared."""
 
 
-def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
+def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
     """Convert a URDF, and return the paths of the tool's input file and of the tool's output file."""
     reads, program, writes = TOOLS[tool]
-    source = converted(reads, pythons, urdf, folder)[1] if reads else urdf
+    source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
     script = f"import pathlib, sys\nsource, to = sys.argv[1:]\n{program}"
     words = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
@@ -125,17 +125,17 @@ def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -
     return source, Path(f"{to}{writes}" if writes else done.stdout.strip().splitlines()[-1])
 
 
-def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
+def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
     with tempfile.TemporaryDirectory() as folder:
-        files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
+        files = convert(tool, pythons, _write_without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
-            source = _loaded(files[0]) if TOOLS[tool].reads else robot
-            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MAX_BOXES)
+            source = _load(files[0]) if TOOLS[tool].reads else robot
+            return urdfkin.same(source, _load(files[1]), boxes=0 if len(pythons) > 1 else MAX_BOXES)
         except urdfkin.UrdfkinError as error:
             raise RefusalError(f"not compared: {error.what}") from None
 
 
-def _without_shapes(urdf: str, folder: Path) -> Path:
+def _write_without_shapes(urdf: str, folder: Path) -> Path:
     """Write a URDF without shapes, and with MuJoCo's lenient settings, which other tools ignore."""
     robot = ElementTree.fromstring(urdf)
     for link in robot.iterfind("link"):
@@ -147,14 +147,14 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
     return file
 
 
-def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
+def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
     """Return the verdict, and bounds on the distance and the angle between matching frames.
 
     The models are compared as they are written. For `urdf-usd-converter`, they are compared after the changes
     that make them equivalent. The angle is then replaced by the distance that single precision can cause.
     """
     try:
-        found = _compared(tool, pythons, robot)
+        found = _compare(tool, pythons, robot)
     except RefusalError as refusal:
         return str(refusal), "", ""
     verdict = found.verdict.value
@@ -170,15 +170,15 @@ def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple
     return verdict, off, length(found.single[0])
 
 
-def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:
+def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:
     for tool in tools:
-        verdict, far, _ = row_of(tool, tools, robot)
+        verdict, far, _ = make_row(tool, tools, robot)
         print(f"{name}, {tool}: {verdict} {far}", file=sys.stderr, flush=True)
         short = [word for start, word in _SHORT.items() if verdict.startswith(start)]
         yield " ".join(filter(None, [*short[:1], "" if short or far else "refused", far]))
 
 
-def _loaded(file: Path) -> urdfkin.Robot:
+def _load(file: Path) -> urdfkin.Robot:
     """Return the robot of a file; read all articulations of a USD file."""
     try:
         return urdfkin.load(file)
@@ -192,14 +192,16 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("tools", nargs="+", metavar="TOOL[=PYTHON]", help=f"one of {', '.join(TOOLS)}")
     parser.add_argument("--robots", nargs="+", default=list(catalogue()), help="default: the whole catalogue")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    tools = {name: python or sys.executable for name, _, python in (t.partition("=") for t in given.tools)}
+    tools = {
+        name: python or sys.executable for name, _, python in (t.partition("=") for t in arguments.tools)
+    }
     [tool, *more] = tools
     last = "single precision allows" if tool == "urdf-usd-converter" else "angle"
     print(table(["robot", "moving joints", *(tools if more else ("verdict", "at most apart", last))], []))
-    for name in given.robots:
+    for name in arguments.robots:
         robot = urdfkin.load(name)
-        row = wide_row(tools, name, robot) if more else row_of(tool, tools, robot)
+        row = make_wide_row(tools, name, robot) if more else make_row(tool, tools, robot)
         joints = sum(joint.kind.nq > 0 for joint in robot.tree.joints)
         print(f"| {name} | {joints} | {' | '.join(row)} |", flush=True)

@@ -14,7 +14,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.mjcf import is_mjcf
 
 
-def said_of(path: Path) -> str:
+def describe_result(path: Path) -> str:
     try:
         robot = urdfkin.load(path)
         robot.placement(robot.sample(2), robot.link_frames)
@@ -36,7 +36,7 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     folder: Path = parser.parse_args().folder
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    counts = Counter(said_of(path) for path in sorted(folder.rglob("*.xml")) if is_mjcf(path))
+    counts = Counter(describe_result(path) for path in sorted(folder.rglob("*.xml")) if is_mjcf(path))
     for said, count in counts.most_common():
         print(f"{count:5d}  {said}")
     print(f"{sum(counts.values()):5d}  files")

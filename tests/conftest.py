@@ -35,6 +35,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads the variable w
 # A shell ignores SIGINT for a process in the background. Tests of Ctrl-C need the default handler.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+# `nohup` ignores SIGHUP. Tests of a closed terminal need the default handler.
+if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # A deadline would fail on a busy machine. Trees need many draws and are large.
 _UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])

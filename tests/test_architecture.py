@@ -13,15 +13,15 @@ from scripts.make_architecture import (
     PACKAGES,
     PAGE,
     PICTURE,
-    all_named,
-    cycles,
-    imports,
+    draw_picture,
+    find_cycles,
+    find_forbidden_imports,
+    imported_names,
+    imported_names_by_module,
+    imports_by_module,
+    make_page,
     modules,
-    named,
     package_of,
-    page,
-    picture,
-    upwards,
 )
 
 #: The most packages and loose modules of `urdfkin`; a reader must be able to remember them.
@@ -31,7 +31,7 @@ OURS = [module for module in modules() if module.split(".")[0] == "urdfkin"]
 
 def foreign(module: str) -> set[str]:
     """Return the foreign libraries that a module imports."""
-    names = {name.split(".")[0] for name in all_named()[module]}
+    names = {name.split(".")[0] for name in imported_names_by_module()[module]}
     return names - {"urdfkin", *sys.stdlib_module_names}
 
 
@@ -44,11 +44,11 @@ def test_the_number_of_packages_stays_small() -> None:
 
 
 def test_no_package_imports_a_later_one() -> None:
-    assert upwards() == []
+    assert find_forbidden_imports() == []
 
 
 def test_no_modules_import_each_other_in_a_cycle() -> None:
-    assert cycles() == []
+    assert find_cycles() == []
 
 
 @pytest.mark.parametrize(
@@ -62,12 +62,12 @@ def test_no_modules_import_each_other_in_a_cycle() -> None:
     ],
 )  # fmt: skip
 def test_every_form_of_import_counts(text: str) -> None:
-    assert {"urdfkin.robot", "urdfkin.robot.Robot", "urdfkin.robot.*"} & set(named(text))
+    assert {"urdfkin.robot", "urdfkin.robot.Robot", "urdfkin.robot.*"} & set(imported_names(text))
 
 
 def test_the_counted_imports_are_those_of_the_files() -> None:
-    assert "urdfkin.errors" in imports()["urdfkin.robot"]
-    assert imports()["urdfkin.kinematics.equations"] == frozenset(), "the equations import nothing"
+    assert "urdfkin.errors" in imports_by_module()["urdfkin.robot"]
+    assert imports_by_module()["urdfkin.kinematics.equations"] == frozenset(), "the equations import nothing"
 
 
 @pytest.mark.parametrize("library", IMPORTERS)
@@ -82,8 +82,8 @@ def test_no_unplanned_library_is_imported() -> None:
 
 
 def test_the_picture_and_the_table_are_current() -> None:
-    assert PICTURE.read_text(encoding="utf-8") == picture()
-    assert PAGE.read_text(encoding="utf-8") == page()
+    assert PICTURE.read_text(encoding="utf-8") == draw_picture()
+    assert PAGE.read_text(encoding="utf-8") == make_page()
 
 
 def test_every_path_on_the_page_exists() -> None:

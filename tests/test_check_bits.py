@@ -63,6 +63,6 @@ def test_a_change_is_reported_and_limited_as_a_fraction_of_the_bound(
 
 def test_zeros_of_different_signs_have_different_bits_and_the_difference_zero() -> None:
     kept = {"r/x/LOCAL": np.zeros(1), "r/x/LOCAL/bound": np.zeros(1)}
-    assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.zeros(1)}, kept) == 0.0
-    assert 0.0 < check_bits.share("r/x/LOCAL", {"r/x/LOCAL": -np.zeros(1)}, kept) < 1e-300
-    assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.full(1, 1e-300)}, kept) == np.inf
+    assert check_bits.difference_ratio("r/x/LOCAL", {"r/x/LOCAL": np.zeros(1)}, kept) == 0.0
+    assert 0.0 < check_bits.difference_ratio("r/x/LOCAL", {"r/x/LOCAL": -np.zeros(1)}, kept) < 1e-300
+    assert check_bits.difference_ratio("r/x/LOCAL", {"r/x/LOCAL": np.full(1, 1e-300)}, kept) == np.inf

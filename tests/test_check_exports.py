@@ -38,16 +38,16 @@ def test_a_stopped_run_in_a_library_continues_with_the_remaining_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, keep = urdfkin.load("planar_two_link"), tmp_path / "jax.jsonl"
-    monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
+    monkeypatch.setattr(check_exports, "leaf_frames", lambda tips: iter([("arm", robot, "tip")]))
     for to, library, share in (("jax", "jax", 0.5), ("array", "torch", 7.0)):
         line = {"file": f"planar_two_link_tip_0_{to}", "library": library, "share": share}
         with keep.open("a", encoding="utf-8") as file:
             file.write(f"{json.dumps(line)}\n")
     assert check_exports.check_library("jax", environment(tmp_path, 0.9), None, keep) == 0
     assert (tmp_path / "ran").read_text("utf-8").split() == ["planar_two_link_tip_0_array"]
-    assert len(check_exports.lines_of(keep)) == 3
+    assert len(check_exports.read_lines(keep)) == 3
     assert check_exports.check_library("jax", environment(tmp_path, 0.9), None, keep) == 0
-    assert len(check_exports.lines_of(keep)) == 3
+    assert len(check_exports.read_lines(keep)) == 3
 
 
 @pytest.mark.slow
@@ -55,21 +55,21 @@ def test_a_number_outside_the_bound_fails_the_run_in_a_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = urdfkin.load("planar_two_link")
-    monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
+    monkeypatch.setattr(check_exports, "leaf_frames", lambda tips: iter([("arm", robot, "tip")]))
     assert check_exports.check_library("jax", environment(tmp_path, 1.5), None, None) == 1
 
 
 def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check_exports, "example_robots", lambda: ("hyq", "ur5"))
-    names = [(name, frame) for name, _, frame in check_exports.subjects(tips=False)]
-    tips = [(name, frame) for name, _, frame in check_exports.subjects(tips=True)]
+    names = [(name, frame) for name, _, frame in check_exports.leaf_frames(tips=False)]
+    tips = [(name, frame) for name, _, frame in check_exports.leaf_frames(tips=True)]
     robots = {name: urdfkin.load(name) for name in ("hyq", "ur5")}
     in_order = [(name, x.tree.frame_name(leaf)) for name, x in robots.items() for leaf in x.tree.leaves()]
     assert tips == [(name, robot.tip_frame) for name, robot in robots.items()]
     assert names[:2] == tips
     assert set(names) == {*in_order, *tips}
     assert len(names) == len(set(names)) == 8
-    assert names == [(name, frame) for name, _, frame in check_exports.subjects(tips=False)]
+    assert names == [(name, frame) for name, _, frame in check_exports.leaf_frames(tips=False)]
     assert names[2:] != [one for one in in_order if one not in tips]
 
 
@@ -77,9 +77,9 @@ def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.Monk
 def test_exact_code_is_checked_with_its_own_proof(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("planar_two_link")
     made: Any = exact.make_exact_functions
-    found = check_exports.found_of(robot, "tip", ["sympy-exact"])
+    found = check_exports.check_frame(robot, "tip", ["sympy-exact"])
     assert found.pop("good")
     assert 0.0 <= found.pop("sympy-exact float64") < 1e-30
     assert not found
     monkeypatch.setattr(exact, "make_exact_functions", lambda *given: made(*given[:-1], False))
-    assert not check_exports.found_of(robot, "tip", ["sympy-exact"])["good"]
+    assert not check_exports.check_frame(robot, "tip", ["sympy-exact"])["good"]

@@ -7,16 +7,16 @@ from scripts import make_conventions as maker
 
 
 def test_the_page_contains_the_libraries_results() -> None:
-    assert maker.PAGE.read_text("utf-8") == maker.page(), "run python scripts/make_conventions.py"
+    assert maker.PAGE.read_text("utf-8") == maker.make_page(), "run python scripts/make_conventions.py"
 
 
 def test_a_result_that_matches_no_or_two_definitions_is_an_error() -> None:
     readings = {"one": np.ones(3), "two": 2.0 * np.ones(3)}
-    assert maker.which(np.ones(3), readings) == "one"
+    assert maker.find_definition(np.ones(3), readings) == "one"
     with pytest.raises(ValueError, match="none"):
-        maker.which(np.zeros(3), readings)
+        maker.find_definition(np.zeros(3), readings)
     with pytest.raises(ValueError, match="one"):
-        maker.which(np.ones(3), readings | {"the same": np.ones(3)})
+        maker.find_definition(np.ones(3), readings | {"the same": np.ones(3)})
 
 
 def test_the_definitions_differ_clearly_for_the_measured_motion() -> None:

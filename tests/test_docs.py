@@ -13,8 +13,8 @@ import pytest
 
 import urdfkin
 from scripts import check_exports, make_pages, measure_size
-from scripts.benchmarking.operations import operations
-from scripts.pages import inserted
+from scripts.benchmarking.operations import count_operations
+from scripts.pages import insert_parts
 from tests import urdfs
 from tests.cli.running import urdfkin as run
 from tests.pages import pages
@@ -28,8 +28,8 @@ PAGES = [*DOCS, "docs/examples/robots.yml", "README.md"]
 
 
 def test_the_layout_on_the_page_is_generated_from_the_schema() -> None:
-    page = make_pages.path_of("reports").read_text("utf-8")
-    assert page == make_pages.page("reports"), "run python scripts/make_pages.py reports"
+    page = make_pages.page_path("reports").read_text("utf-8")
+    assert page == make_pages.make_page("reports"), "run python scripts/make_pages.py reports"
 
 
 def commands() -> list[tuple[str, str]]:
@@ -77,7 +77,7 @@ def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
     target = re.findall(r"^docs:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.M)[0]
     run_by_make = set(re.findall(r"python scripts/(\w+)\.py", target))
     texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "scripts").glob("*.py")}
-    writers = {name for name, text in texts.items() if re.search(r"PAGE\.write_text|insert\(PAGE", text)}
+    writers = {name for name, text in texts.items() if re.search(r"PAGE\.write_text|update_page\(PAGE", text)}
     makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
     assert run_by_make == writers | makers - {"make_pictures"}  # screenshots need a browser
 
@@ -85,21 +85,27 @@ def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
 @pytest.mark.slow
 def test_the_sizes_of_exported_code_are_those_on_the_page() -> None:
     text = check_exports.PAGE.read_text("utf-8")
-    assert check_exports.page(text) == text, "run python scripts/check_exports.py --sizes"
+    assert check_exports.make_page(text) == text, "run python scripts/check_exports.py --sizes"
 
 
 @pytest.mark.slow
 def test_the_size_of_an_installation_is_written_by_its_script() -> None:
     text = measure_size.PAGE.read_text("utf-8")
     (checking,) = re.findall(r"needs only urdfkin and click, together (\d+) MB\.", text)
-    assert abs(int(checking) - (measure_size.own() + measure_size.closure("click")["click"]) / 1e6) < 1.0
+    assert (
+        abs(
+            int(checking)
+            - (measure_size.measure_wheel() + measure_size.measure_packages("click")["click"]) / 1e6
+        )
+        < 1.0
+    )
     core = {"example-robot-data": 10**9, "click": 10**6, "trimesh": 10**9}
-    written = measure_size.sentences(core, {"click": 10**6}, {"view": (8, 40_000_000)})
-    assert "takes 2.0 GB: 1.00 GB for" in inserted(text, size=written)
+    written = measure_size.make_section(core, {"click": 10**6}, {"view": (8, 40_000_000)})
+    assert "takes 2.0 GB: 1.00 GB for" in insert_parts(text, size=written)
     assert "2 packages (2000 MB) come only" in written
     assert "| `[view]` | 8 | 40 MB |" in written
     with pytest.raises(ValueError, match="0 places"):
-        inserted("", size=written)
+        insert_parts("", size=written)
 
 
 @pytest.mark.slow
@@ -283,18 +289,18 @@ def test_the_projects_own_robots_have_no_findings(path: Path) -> None:
 
 def counted(name: str, frame: str, quantity: str) -> int:
     robot = urdfkin.load(name, mimic=False)
-    return operations(robot.plan([robot.tree.frame_link(frame)]), quantity)
+    return count_operations(robot.plan([robot.tree.frame_link(frame)]), quantity)
 
 
 def test_one_joint_about_z_needs_the_operations_counted_by_hand() -> None:
     plan = urdfkin.load(urdfs.robot(urdfs.joint("j", "continuous", "a", "b"))).plan([1])
     # Sine and cosine 51. R Rz: three rows of two numbers, each two products and a sum: 18. The column: p - o
     # 3 and z x d 9, and nothing else.
-    assert operations(plan, "jacobian") == 51 + 18 + 12
+    assert count_operations(plan, "jacobian") == 51 + 18 + 12
     # w + v z: 6.
-    assert operations(plan, "velocity") == 51 + 18 + 6
+    assert count_operations(plan, "velocity") == 51 + 18 + 6
     # alpha + a z + v w x z: 6 + 9 + 6.
-    assert operations(plan, "acceleration") == 51 + 18 + 6 + 6 + 15
+    assert count_operations(plan, "acceleration") == 51 + 18 + 6 + 6 + 15
 
 
 def test_operations_of_unused_outputs_are_not_counted() -> None:

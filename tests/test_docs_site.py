@@ -14,7 +14,14 @@ from pathlib import Path
 import pytest
 
 import urdfkin
-from scripts.docs_site import LIBRARY, address, commands_page, library_page, notebook, subject_page
+from scripts.docs_site import (
+    LIBRARY,
+    find_address,
+    make_commands_page,
+    make_library_page,
+    make_notebook,
+    make_subject_page,
+)
 from tests.pages import DOCS, blocks, pages
 from tests.report.browser import Browser, opened
 from urdfkin.cli import commands
@@ -46,7 +53,7 @@ def documented() -> Iterator[tuple[str, object]]:
         yield name, pydoc.locate(name)
     for _, _, names in LIBRARY.values():
         for name in names.split():
-            found = pydoc.locate(address(name))
+            found = pydoc.locate(find_address(name))
             yield name, found
             for member, value in vars(found).items() if inspect.isclass(found) else ():
                 defined = inspect.isfunction(value) or isinstance(
@@ -132,7 +139,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 def test_the_pages_of_commands_and_library_contain_every_name() -> None:
-    page = commands_page()
+    page = make_commands_page()
     assert [name for name in commands() if f"\n## urdfkin {name}\n" not in page] == []
     assert "Usage: urdfkin report merge" in page
     shown = [name for _, _, names in LIBRARY.values() for name in names.split()]
@@ -142,16 +149,18 @@ def test_the_pages_of_commands_and_library_contain_every_name() -> None:
     assert {name for name in shown if "." not in name} - set(urdfkin.__all__) == members
     assert shown[0] == "load"
     for path, (_, _, names) in LIBRARY.items():
-        described = re.findall(r"^::: (.*)$", subject_page(path), re.MULTILINE)
-        assert described == [address(name) for name in names.split()]
-        assert [name for name in names.split() if f"({path}#{address(name)})" not in library_page()] == []
+        described = re.findall(r"^::: (.*)$", make_subject_page(path), re.MULTILINE)
+        assert described == [find_address(name) for name in names.split()]
+        assert [
+            name for name in names.split() if f"({path}#{find_address(name)})" not in make_library_page()
+        ] == []
 
 
 def _documented() -> list[str]:
     """Return the full path of each name on the library pages, and of each public member of its classes."""
     found = []
     for name in " ".join(names for _, _, names in LIBRARY.values()).split():
-        path = address(name)
+        path = find_address(name)
         module, _, own = path.rpartition(".")
         found.append(path)
         if name != "Robot" and isinstance(cls := getattr(pydoc.locate(module), own), type):
@@ -169,7 +178,7 @@ def test_each_name_in_the_reference_has_an_example(path: str) -> None:
 
 @pytest.mark.parametrize("page", [page for page in pages() if page.startswith("lessons/")])
 def test_a_lesson_becomes_a_notebook_with_its_outputs(page: str) -> None:
-    made = json.loads(json.dumps(notebook((DOCS / page).read_text("utf-8"))))
+    made = json.loads(json.dumps(make_notebook((DOCS / page).read_text("utf-8"))))
     code = [cell for cell in made["cells"] if cell["cell_type"] == "code"]
     told = blocks(page)
     assert [cell["source"] for cell in code] == [text.rstrip() for kind, text in told if kind == "python"]
@@ -183,10 +192,10 @@ def test_a_lesson_becomes_a_notebook_with_its_outputs(page: str) -> None:
 
 @pytest.mark.long
 def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
-    from scripts.docs_docstrings import fenced
+    from scripts.docs_docstrings import fence_doctests
 
     shown = "It adds.\n\n```pycon\n>>> add(1,\n...     2)\n3\n```\n\nAnd so on."
-    assert fenced("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == shown
-    assert fenced("Example:\n    >>> 1\n    1\n") == "```pycon\n>>> 1\n1\n```\n"
+    assert fence_doctests("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == shown
+    assert fence_doctests("Example:\n    >>> 1\n    1\n") == "```pycon\n>>> 1\n1\n```\n"
     shown = "One.\n\n    ```pycon\n    >>> 1\n    1\n    ```\n    "
-    assert fenced("One.\n\n    Example:\n        >>> 1\n        1\n    ") == shown
+    assert fence_doctests("One.\n\n    Example:\n        >>> 1\n        1\n    ") == shown

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from scripts.docs_site import notebook
+from scripts.docs_site import make_notebook
 from tests.pages import DOCS, pages
 
 if not os.environ.get("CI"):  # there it must be
@@ -29,7 +29,7 @@ Cell = dict[str, Any]
 
 
 def cells_of(page: str) -> list[Cell]:
-    cells: list[Cell] = notebook((DOCS / page).read_text("utf-8"))["cells"]
+    cells: list[Cell] = make_notebook((DOCS / page).read_text("utf-8"))["cells"]
     return cells
 
 
@@ -40,7 +40,7 @@ def code(source: str) -> Cell:
 def executed(cells: list[Cell], home: Path) -> list[Cell]:
     """Run a notebook in a kernel with its own folder, and return the cells."""
     nbformat, client = (import_module(name) for name in ("nbformat", "nbclient"))  # without types
-    book = nbformat.reads(json.dumps(notebook("") | {"cells": cells}), as_version=4)
+    book = nbformat.reads(json.dumps(make_notebook("") | {"cells": cells}), as_version=4)
     client.NotebookClient(book, timeout=300, resources={"metadata": {"path": str(home)}}).execute()
     done: list[Cell] = book["cells"]
     return done

@@ -21,7 +21,9 @@ FEATURES = maker.FEATURES
 def test_the_expected_poses_are_those_of_a_reader_written_from_the_standard(name: str) -> None:
     text = FEATURES[name].text
     robot = urdfkin.load(text)
-    for values, found in zip(maker.configurations(robot), maker.expected(robot), strict=True):
+    for values, found in zip(
+        maker.draw_configurations(robot), maker.compute_expected_poses(robot), strict=True
+    ):
         other = poses(text, values)
         assert other.keys() == found.keys()
         # rpy="90 -45 30" loses eps * 90 in an angle, which turns entries by as much
@@ -30,7 +32,7 @@ def test_the_expected_poses_are_those_of_a_reader_written_from_the_standard(name
 
 def test_the_page_shows_the_figures_of_its_file() -> None:
     text = maker.PAGE.read_text("utf-8")
-    assert text == maker.page(text, FIGURES), "run python scripts/make_libraries.py --page"
+    assert text == maker.make_page(text, FIGURES), "run python scripts/make_libraries.py --page"
     assert f"{FIGURES['configurations']} random configurations" in " ".join(text.split())
     assert f"The poses agree to {FIGURES['tolerance']:g}." in text
 
@@ -53,8 +55,8 @@ def test_the_cells_of_an_installed_library_can_be_measured_again(library: str) -
         pytest.skip(f"{library} is not installed in the version of the table")
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     for name, feature in FEATURES.items():
-        case = {"text": feature.text, "configurations": maker.configurations(robots[name])}
-        found = maker.cell(feature, robots[name], library, evaluate_case(library, case))
+        case = {"text": feature.text, "configurations": maker.draw_configurations(robots[name])}
+        found = maker.make_cell(feature, robots[name], library, evaluate_case(library, case))
         assert found["verdict"] == FIGURES["cells"][library][name]["verdict"], name
 
 
@@ -67,6 +69,6 @@ def test_a_library_that_crashes_or_prints_does_not_end_the_run(tmp_path: Path) -
         "    print(json.dumps({'name': case['name'], 'error': 'x'}), flush=True)\n"
     )
     python.chmod(0o755)
-    found = list(maker.answers(python, "kinpy", [{"name": name} for name in "abc"]))
+    found = list(maker.run_library(python, "kinpy", [{"name": name} for name in "abc"]))
     assert [one["name"] for one in found] == ["a", "b", "c"]
     assert "ended with -6" in found[1]["error"]

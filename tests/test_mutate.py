@@ -16,15 +16,15 @@ from scripts.mutate import (
     PACKAGE,
     ROOT,
     Mutant,
-    argued,
     evaluate,
-    files,
+    find_files,
+    find_near_tests,
+    harmless_mutants,
+    list_mutants,
     main,
-    module_of,
-    mutants,
-    near_tests,
+    module_name,
 )
-from scripts.mutating.operators import changes_of, function_at, mutated
+from scripts.mutating.operators import apply_change, function_at, list_changes
 
 SOURCE = '''
 """A text is left alone: 1 < 2."""
@@ -48,13 +48,13 @@ WHAT = {
 
 
 def test_every_kind_of_mutant_is_made_once_and_only_in_executed_code() -> None:
-    found = [change.what for change in changes_of(ast.parse(SOURCE))]
+    found = [change.text for change in list_changes(ast.parse(SOURCE))]
     assert sorted(found) == sorted(WHAT)
 
 
 def test_each_mutant_changes_one_line_and_no_two_are_equal() -> None:
     original = ast.unparse(ast.parse(SOURCE))
-    changed = {ast.unparse(mutated(SOURCE, number)) for number in range(len(WHAT))}
+    changed = {ast.unparse(apply_change(SOURCE, number)) for number in range(len(WHAT))}
     assert len(changed) == len(WHAT)
     for text in changed:
         pairs = zip(original.splitlines(), text.splitlines(), strict=True)
@@ -63,40 +63,40 @@ def test_each_mutant_changes_one_line_and_no_two_are_equal() -> None:
 
 @pytest.mark.long
 def test_the_files_that_numba_compiles_exist_and_no_other_file_is_left_out() -> None:
-    left_out = {path.relative_to(PACKAGE).as_posix() for path in {*PACKAGE.rglob("*.py")} - {*files([])}}
+    left_out = {path.relative_to(PACKAGE).as_posix() for path in {*PACKAGE.rglob("*.py")} - {*find_files([])}}
     assert left_out == COMPILED
 
 
 @pytest.mark.slow
 def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
-    for path in files([]):
+    for path in find_files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for statement in tree.body:
-            for change in changes_of(ast.Module([statement], []))[::20]:
-                with change.made():
+            for change in list_changes(ast.Module([statement], []))[::20]:
+                with change.applied():
                     compile(ast.fix_missing_locations(ast.Module([statement], [])), str(path), "exec")
         if path.stem not in ("__init__", "__main__"):
-            assert near_tests(path), path
+            assert find_near_tests(path), path
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("what", "word"),
-    [("self.bound_ratio <= 1.0  ->  self.bound_ratio < 1.0", "survived"), ("1.0  ->  1.5", "noticed")],
+    [("self.bound_ratio <= 1.0  ->  self.bound_ratio < 1.0", "survived"), ("1.0  ->  1.5", "detected")],
 )
 def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    places = [m for m in mutants(["verify/comparison"]) if m.place.endswith("Comparison.agrees")]
-    (mutant,) = [m for m in places if m.what == what]
+    places = [m for m in list_mutants(["verify/comparison"]) if m.function.endswith("Comparison.agrees")]
+    (mutant,) = [m for m in places if m.change == what]
     test = tmp_path / "test_one.py"
     test.write_text(
         "from urdfkin.verify.comparison import BatchComparison\n"
         "def test_a_share_above_one_disagrees():\n    assert not BatchComparison(1, 9.0, 1.4, ()).agrees\n",
         encoding="utf-8",
     )
-    monkeypatch.setattr("scripts.mutate.near_tests", lambda path: [str(test)])
-    assert evaluate(mutant, timeout=100.0).word == word
+    monkeypatch.setattr("scripts.mutate.find_near_tests", lambda path: [str(test)])
+    assert evaluate(mutant, timeout=100.0).result == word
 
 
 #: Names of former parts of the package.
@@ -115,32 +115,34 @@ SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 def drawn(count: int) -> list[Mutant]:
     """Return the mutants with the smallest hashes: a change elsewhere in a file draws no others."""
-    named = {f"{SEED} {mutant.place} {mutant.what}".encode(): mutant for mutant in mutants(PARTS)}
+    named = {f"{SEED} {mutant.function} {mutant.change}".encode(): mutant for mutant in list_mutants(PARTS)}
     return [named[name] for name in sorted(named, key=lambda name: hashlib.sha256(name).hexdigest())[:count]]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
 def test_a_random_mutant_is_detected_or_documented_as_harmless(mutant: Mutant) -> None:
-    if (mutant.place, mutant.what) not in argued():
+    if (mutant.function, mutant.change) not in harmless_mutants():
         outcome = evaluate(mutant, timeout=300.0, slow=True)
-        assert outcome.word != "survived", f"{mutant.place}: {mutant.what}"
+        assert outcome.result != "survived", f"{mutant.function}: {mutant.change}"
 
 
 @pytest.mark.long
 def test_each_documented_harmless_mutant_exists_and_is_listed_once() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("- `urdfkin.")]
-    assert len(lines) == len(argued()) > 0
-    modules = {module_of(path): path for path in files([])}
-    named = {place: [name for name in modules if place.startswith(name)] for place, _ in argued()}
+    assert len(lines) == len(harmless_mutants()) > 0
+    modules = {module_name(path): path for path in find_files([])}
+    named = {place: [name for name in modules if place.startswith(name)] for place, _ in harmless_mutants()}
     parts = {str(modules[max(names, key=len)].relative_to(PACKAGE)) for names in named.values()}
-    assert argued().keys() <= {(mutant.place, mutant.what) for mutant in mutants(sorted(parts))}
+    assert harmless_mutants().keys() <= {
+        (mutant.function, mutant.change) for mutant in list_mutants(sorted(parts))
+    }
 
 
 def test_a_harmless_mutant_is_one_line_of_the_page() -> None:
-    assert not [what for _, what in argued() if "\n" in what]
-    assert all(why[-1] == "." for why in argued().values())
+    assert not [what for _, what in harmless_mutants() if "\n" in what]
+    assert all(why[-1] == "." for why in harmless_mutants().values())
 
 
 @pytest.mark.parametrize(
@@ -176,7 +178,7 @@ def test_every_part_of_the_package_on_the_page_exists() -> None:
     named = [word for words in commands for word in takewhile(lambda word: word[0] != "-", words)]
     assert len(measured) > 9
     assert len(named) > 2
-    assert files(measured + named)
+    assert find_files(measured + named)
 
 
 @pytest.mark.parametrize(("line", "place"), [(3, "C"), (5, "C.f"), (7, "C.f.g"), (9, "h"), (1, "")])

@@ -6,37 +6,37 @@ import re
 import pytest
 
 from scripts import make_pages as maker
-from scripts.benchmarking.tables import NOT_MEASURED, number, page, tables
+from scripts.benchmarking.tables import NOT_MEASURED, format_number, make_page, make_tables
 
-TEXT = maker.path_of("performance").read_text("utf-8")
+TEXT = maker.page_path("performance").read_text("utf-8")
 FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
 
 
 def test_the_page_shows_the_figures_of_its_file() -> None:
-    assert maker.page("performance") == TEXT, "run python scripts/make_pages.py performance"
+    assert maker.make_page("performance") == TEXT, "run python scripts/make_pages.py performance"
 
 
 def test_a_different_figure_gives_a_different_page() -> None:
     first, *others = FIGURES["rows"]
     changed = {**FIGURES, "rows": [{**first, "median_ns": 12_345.0}, *others]}
-    assert "| 12,345 |" in page(TEXT, changed)
+    assert "| 12,345 |" in make_page(TEXT, changed)
 
 
 def test_the_first_table_separates_all_threads_and_code_compiled_for_one_robot() -> None:
     rows = [row for row in FIGURES["rows"] if row["section"] == "batch"]
-    batch = {(f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"] for row in rows}
-    (summary,) = [words for words in tables(FIGURES) if words.section == "summary"]
+    batch = {(f"{row['robot']}, {row['quantity']}", row["label"]): row["ratio"] for row in rows}
+    (summary,) = [words for words in make_tables(FIGURES) if words.section == "summary"]
     heads = list(enumerate(summary.head))
     threads, compiled = (next(i for i, head in heads if word in head) for word in ("all threads", "compiled"))
     several = f"urdfkin, {FIGURES['machine']['processors']} threads"
     for row in summary.rows:
-        assert row[threads] == number(batch[row[0], several])
-        assert row[compiled] == number(batch[row[0], "urdfkin, compiled for this robot, 1 thread"])
+        assert row[threads] == format_number(batch[row[0], several])
+        assert row[compiled] == format_number(batch[row[0], "urdfkin, compiled for this robot, 1 thread"])
 
 
 def test_figures_without_a_marker_on_the_page_are_refused() -> None:
     with pytest.raises(ValueError, match="places for"):
-        page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
+        make_page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
 
 
 def test_no_figure_is_written_by_hand() -> None:
@@ -51,7 +51,7 @@ def test_the_picture_is_a_small_file() -> None:
 
 def test_figures_that_were_not_measured_are_marked_as_missing() -> None:
     without = {**FIGURES, "rows": [row for row in FIGURES["rows"] if row["section"] != "sizes"]}
-    place = page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
+    place = make_page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
     assert place.startswith(NOT_MEASURED)
 
 
@@ -63,4 +63,4 @@ def test_the_page_shows_the_time_of_each_step_of_a_batch_and_of_a_single_call() 
         }
         for kind in ("batch", "single")
     ]  # fmt: skip
-    assert page(TEXT, {**FIGURES, "where": where}).count("| walk | 10.0 (25 %) |") == 2
+    assert make_page(TEXT, {**FIGURES, "where": where}).count("| walk | 10.0 (25 %) |") == 2

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from scripts import plain_words
-from scripts.plain_words import PLAIN, ROOT, complaints, long_sentences
+from scripts.plain_words import PLAIN, ROOT, find_long_sentences, find_words
 
 
 def test_pages_docstrings_comments_and_messages_avoid_the_words_of_the_list() -> None:
-    assert complaints([ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md", ROOT / "CONTRIBUTING.md"]) == []
+    assert find_words([ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md", ROOT / "CONTRIBUTING.md"]) == []
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_a_word_of_the_list_is_reported_with_its_place_and_its_plain_form(
 ) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / name).write_text(text, encoding="utf-8")
-    found = complaints([tmp_path])
+    found = find_words([tmp_path])
     assert found
     assert all(one.startswith(f"{name}:{line}: ") and "; write: " in one for one in found)
 
@@ -34,13 +34,13 @@ def test_a_word_of_the_list_is_reported_with_its_place_and_its_plain_form(
 def test_code_on_a_page_is_not_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / "page.md").write_text("```python\nfollower = 1  # witness\n```\nSee `follower`.\n")
-    assert complaints([tmp_path]) == []
+    assert find_words([tmp_path]) == []
 
 
 def test_only_long_sentences_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / "page.md").write_text("Word " * 31 + ".\n" + "Word " * 20 + ".\n")
-    (found,) = long_sentences([tmp_path])
+    (found,) = find_long_sentences([tmp_path])
     assert found.startswith("page.md:1: 32 words")
 
 

@@ -169,6 +169,9 @@ def test_the_packages_that_only_yourdfpy_needs_are_not_in_the_line_that_avoids_t
     named = {re.split("[<>=]", word)[0] for word in shlex.split(line)[2:]}
     needed = {re.split("[<>=]", need)[0] for need in PROJECT["dependencies"]}
     assert named == needed - {"yourdfpy"}
-    only = measure_size.closure("urdfkin").keys() - measure_size.closure("urdfkin", without="yourdfpy").keys()
+    only = (
+        measure_size.measure_packages("urdfkin").keys()
+        - measure_size.measure_packages("urdfkin", without="yourdfpy").keys()
+    )
     assert {"yourdfpy", "trimesh"} <= only
     assert not only & named

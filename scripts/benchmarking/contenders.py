@@ -16,8 +16,8 @@ import numpy as np
 import pinocchio as pin
 
 from scripts.benchmarking import generated
-from scripts.benchmarking.subject import Subject, bare_urdf
-from scripts.benchmarking.timing import Calls, Work
+from scripts.benchmarking.timing import Calls, TimedTask
+from scripts.benchmarking.workload import Workload, bare_urdf
 from urdfkin.compiled.plan import StepField
 from urdfkin.kinematics.arithmetic import bind_equations
 from urdfkin.model.tree import FloatArray
@@ -36,13 +36,13 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 class Contender:
     library: str
     module: str
-    calls: Callable[[Subject, str], Iterator[Calls]] | None = None
+    calls: Callable[[Workload, str], Iterator[Calls]] | None = None
     #: None if the library has no function for batches; the benchmark then calls the library in a loop.
-    batches: Callable[[Subject, str], Iterator[Work]] | None = None
+    batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
     @property
-    def missing(self) -> str | None:
+    def reason_missing(self) -> str | None:
         """Return the reason why the library cannot run, or None."""
         if util.find_spec(self.module) is None:
             return "not installed"
@@ -51,52 +51,52 @@ class Contender:
         return None
 
     @property
-    def state(self) -> str:
+    def version(self) -> str:
         try:
-            return self.missing or metadata.version(self.library)
+            return self.reason_missing or metadata.version(self.library)
         except metadata.PackageNotFoundError:
             return "a checkout"
 
-    def works(self, subject: Subject, quantity: str) -> list[Work]:
-        if self.missing:
+    def make_tasks(self, workload: Workload, quantity: str) -> list[TimedTask]:
+        if self.reason_missing:
             return []
         if self.batches is not None:
-            return list(self.batches(subject, quantity))
-        return [one.batch(subject, quantity) for one in self.singles(subject, quantity)]
+            return list(self.batches(workload, quantity))
+        return [one.make_batch_task(workload, quantity) for one in self.make_single_calls(workload, quantity)]
 
-    def singles(self, subject: Subject, quantity: str) -> list[Calls]:
-        return [] if self.missing or self.calls is None else list(self.calls(subject, quantity))
+    def make_single_calls(self, workload: Workload, quantity: str) -> list[Calls]:
+        return [] if self.reason_missing or self.calls is None else list(self.calls(workload, quantity))
 
 
-def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
+def urdfkin_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
     """Yield the timed tasks for a batch, with different numbers of threads and output arrays.
 
     The task `FLOOR` computes nothing and only writes the output array.
     """
-    method, n = getattr(subject.robot, quantity), subject.n
-    inputs = subject.inputs(quantity, n)
-    out, own, floor = np.empty((3, n, *subject.width(quantity)))
+    method, n = getattr(workload.robot, quantity), workload.n
+    inputs = workload.inputs(quantity, n)
+    out, own, floor = np.empty((3, n, *workload.result_shape(quantity)))
     last: list[FloatArray] = []
 
     def fresh() -> None:
-        last[:] = [method(*inputs, subject.frame, threads=1, verify=False)]
+        last[:] = [method(*inputs, workload.frame, threads=1, verify=False)]
 
     for threads in sorted({1, PROCESSORS}):
-        into = partial(method, *inputs, subject.frame, out=out, threads=threads, verify=False)
-        yield Work(ONE if threads == 1 else SEVERAL, n, into, lambda: out)
-    yield Work(FRESH, n, fresh, lambda: last[0])
-    fast = getattr(subject.robot.compile(subject.frame), quantity)
-    yield Work(COMPILED, n, partial(fast, *inputs, out=own, threads=1), lambda: own)
-    yield Work(FLOOR, n, partial(floor.fill, 1.0))
+        into = partial(method, *inputs, workload.frame, out=out, threads=threads, verify=False)
+        yield TimedTask(ONE if threads == 1 else SEVERAL, n, into, lambda: out)
+    yield TimedTask(FRESH, n, fresh, lambda: last[0])
+    fast = getattr(workload.robot.compile(workload.frame), quantity)
+    yield TimedTask(COMPILED, n, partial(fast, *inputs, out=own, threads=1), lambda: own)
+    yield TimedTask(FLOOR, n, partial(floor.fill, 1.0))
 
 
-def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
+def urdfkin_calls(workload: Workload, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
     """Yield the calls of the robot's method and of a prepared frame.
 
     If `verify` is False, also yield the calls of a compiled frame.
     """
-    robot, frame = subject.robot, subject.frame
-    names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
+    robot, frame = workload.robot, workload.frame
+    names = {"robot": robot, "frame": frame, "out": np.empty(workload.result_shape(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
     call = f"{quantity}({'q' if quantity == 'jacobian' else 'q, v, a'}"
     lines = {
@@ -105,7 +105,9 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
     }
     if not verify:
         names["compiled"] = robot.compile(frame)
-        lines |= {f"{who}.{quantity}(out=)": f"{who}.{call}, out=out)" for who in ("prepared", "compiled")}
+        lines |= {
+            f"{label}.{quantity}(out=)": f"{label}.{call}, out=out)" for label in ("prepared", "compiled")
+        }
     for shown, line in lines.items():
         yield Calls(f"urdfkin, {shown}", names, (line,))
 
@@ -129,44 +131,53 @@ def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
     return Calls(LOOP, names, (forward, get), store, read_one=lambda motion: np.array(motion.vector))
 
 
-def all_joints_calls(subject: Subject) -> Calls:
-    usual = pinocchio_calls(subject.urdf, subject.frame, "jacobian")
+def all_joints_calls(workload: Workload) -> Calls:
+    usual = pinocchio_calls(workload.urdf, workload.frame, "jacobian")
     names = {**usual.names, "compute": pin.computeJointJacobians, "get": pin.getFrameJacobian}
     return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
 
 
 #: The loop and the shared arrays of a worker process.
-_here: dict[str, Any] = {}
+_worker_state: dict[str, Any] = {}
 
 
-def pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
+def pinocchio_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
     """Yield two ways to compute a batch with Pinocchio: a loop, and processes with shared memory."""
-    yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
+    yield pinocchio_calls(workload.urdf, workload.frame, quantity).make_batch_task(workload, quantity)
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
-    for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):
+    for x in (
+        *workload.inputs(quantity, workload.n),
+        np.zeros((workload.n, *workload.result_shape(quantity))),
+    ):
         buffers.append((spawn.RawArray("d", x.size), x.shape))
-        arrays.append(_array(*buffers[-1]))
+        arrays.append(_view_array(*buffers[-1]))
         arrays[-1][...] = x
-    pool = subject.stack.enter_context(
-        ProcessPoolExecutor(PROCESSORS, spawn, _start, (subject.urdf, subject.frame, quantity, buffers))
+    pool = workload.stack.enter_context(
+        ProcessPoolExecutor(
+            PROCESSORS, spawn, _start_worker, (workload.urdf, workload.frame, quantity, buffers)
+        )
     )
-    edges = [subject.n * i // PROCESSORS for i in range(PROCESSORS + 1)]
-    yield Work(PROCESSES, subject.n, lambda: list(pool.map(_share, edges, edges[1:])), lambda: arrays[-1])
+    edges = [workload.n * i // PROCESSORS for i in range(PROCESSORS + 1)]
+    yield TimedTask(
+        PROCESSES, workload.n, lambda: list(pool.map(_compute_part, edges, edges[1:])), lambda: arrays[-1]
+    )
 
 
-def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
+def _view_array(buffer: Any, shape: Sequence[int]) -> FloatArray:
     return np.frombuffer(buffer).reshape(shape)
 
 
-def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]) -> None:
-    _here["loop"] = pinocchio_calls(urdf, frame, quantity).loop()
-    _here["arrays"] = [_array(*buffer) for buffer in buffers]
+def _start_worker(
+    urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]
+) -> None:
+    _worker_state["loop"] = pinocchio_calls(urdf, frame, quantity).make_loop()
+    _worker_state["arrays"] = [_view_array(*buffer) for buffer in buffers]
 
 
-def _share(start: int, stop: int) -> None:
-    *inputs, out = (x[start:stop] for x in _here["arrays"])
-    _here["loop"](out, *inputs)
+def _compute_part(start: int, stop: int) -> None:
+    *inputs, out = (x[start:stop] for x in _worker_state["arrays"])
+    _worker_state["loop"](out, *inputs)
 
 
 # Some libraries order rows or coordinates differently. The measured time does not include the reordering.
@@ -175,20 +186,20 @@ def _share(start: int, stop: int) -> None:
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
-def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
+def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
     """Return the index in `ours` of each name in `theirs`."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
 
-def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
+def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
     """Return an array (n, 6, nv): the columns of `J` (n, 6, m) at the indices `columns`, else zeros."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
 
 
-def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
+def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
     Its Jacobians have rows [angular; linear] and one column for each joint, in breadth-first order of the
@@ -196,14 +207,14 @@ def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
     """
     import dynibo
 
-    robot = dynibo.Robot.from_urdf(str(subject.file))
-    nv, order = subject.nv, positions(subject.robot.joint_names, breadth_first(subject.urdf))
+    robot = dynibo.Robot.from_urdf(str(workload.file))
+    nv, order = workload.nv, find_indices(workload.robot.joint_names, breadth_first_joints(workload.urdf))
     back = np.argsort(order)
 
     def read(flat: FloatArray) -> FloatArray:
         return flat.reshape(-1, nv, 6).transpose(0, 2, 1)[:, LINEAR_FIRST][..., back]
 
-    names = {"robot": robot, "frame": robot.link_id(subject.frame), "buffer": np.empty(6 * nv)}
+    names = {"robot": robot, "frame": robot.link_id(workload.frame), "buffer": np.empty(6 * nv)}
     if quantity == "jacobian":
         lines, into = (f"robot.jacobian(q, frame, out={out})" for out in ("buffer", "out[k]"))
         yield Calls("dynibo, loop", names, (lines,), (into,), order, (6 * nv,), read)
@@ -215,7 +226,7 @@ def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
     )
 
 
-def breadth_first(urdf: str) -> list[str]:
+def breadth_first_joints(urdf: str) -> list[str]:
     joints = ET.fromstring(urdf).findall("joint")
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
@@ -232,22 +243,22 @@ def _link(joint: ET.Element, tag: str) -> str:
     return next(joint.iter(tag)).attrib["link"]
 
 
-def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
+def mujoco(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of MuJoCo, which has rows [angular; linear]."""
     import mujoco
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
-    model = mujoco.MjModel.from_xml_string(bare_urdf(subject.urdf, flags=flags))
+    model = mujoco.MjModel.from_xml_string(bare_urdf(workload.urdf, flags=flags))
     model.opt.gravity[:] = 0.0
     data = mujoco.MjData(model)
     theirs = [model.joint(i).name for i in range(model.njnt)]
-    order = positions(subject.robot.joint_names, theirs)
-    x, back = np.empty(subject.width(quantity)), np.argsort(order)
+    order = find_indices(workload.robot.joint_names, theirs)
+    x, back = np.empty(workload.result_shape(quantity)), np.argsort(order)
     names = {
         **{name: getattr(mujoco, f"mj_{name}") for name in ("kinematics", "comPos", "comVel", "jacBody")},
         **{"rne": mujoco.mj_rnePostConstraint, "get": mujoco.mj_objectAcceleration},
         **{"m": model, "d": data, "qpos": data.qpos, "qvel": data.qvel, "qacc": data.qacc},
-        **{"body": model.body(subject.frame).id, "kind": mujoco.mjtObj.mjOBJ_XBODY},
+        **{"body": model.body(workload.frame).id, "kind": mujoco.mjtObj.mjOBJ_XBODY},
         **{"x": x, "linear": x[:3], "angular": x[3:]},
     }
     place = ("qpos[:] = q", "kinematics(m, d)", "comPos(m, d)")
@@ -267,21 +278,21 @@ def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
     yield Calls("MuJoCo, loop", names, one, store, order, read=read)
 
 
-def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
+def drake(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of Drake, which has rows [angular; linear]."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import JacobianWrtVariable
 
     plant = MultibodyPlant(0.0)
-    Parser(plant).AddModelsFromString(subject.urdf, "urdf")
-    joints = ET.fromstring(subject.urdf).findall("joint")
+    Parser(plant).AddModelsFromString(workload.urdf, "urdf")
+    joints = ET.fromstring(workload.urdf).findall("joint")
     (root,) = {_link(x, "parent") for x in joints} - {_link(x, "child") for x in joints}
     world = plant.world_frame()
     plant.WeldFrames(world, plant.GetFrameByName(root))
     plant.Finalize()
-    starts = [plant.GetJointByName(name).velocity_start() for name in subject.robot.joint_names]
-    frame = plant.GetFrameByName(subject.frame)
+    starts = [plant.GetJointByName(name).velocity_start() for name in workload.robot.joint_names]
+    frame = plant.GetFrameByName(workload.frame)
     names = {
         "plant": plant,
         "context": plant.CreateDefaultContext(),
@@ -304,42 +315,42 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
     )
 
 
-def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
+def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of the Robotics Toolbox; an acceleration is J a + Jdot v."""
     import roboticstoolbox as rtb
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # The library warns that its URDF reader is deprecated.
-        robot: Any = rtb.Robot.URDF(str(subject.file))
-    path = robot.ets(end=subject.frame)
+        robot: Any = rtb.Robot.URDF(str(workload.file))
+    path = robot.ets(end=workload.frame)
     moving = sorted((link for link in robot.links if link.jindex is not None), key=lambda x: x.jindex)
-    order = positions(subject.robot.joint_names, [link._joint_name for link in moving])
+    order = find_indices(workload.robot.joint_names, [link._joint_name for link in moving])
     columns = [int(i) for i in path.jindices]
     names = {"path": path, "tensordot": np.tensordot, "columns": np.array(columns)}
-    who, remark = "Robotics Toolbox, loop", "computes only the columns of the path's joints"
+    label, remark = "Robotics Toolbox, loop", "computes only the columns of the path's joints"
     if quantity == "jacobian":
         ours, shape = [order[i] for i in columns], (6, len(columns))
 
         def read(J: FloatArray) -> FloatArray:
-            return spread(J, ours, subject.nv)
+            return fill_columns(J, ours, workload.nv)
 
-        yield Calls(who, names, ("path.jacob0(q)",), None, order, shape, read, remark=remark)
+        yield Calls(label, names, ("path.jacob0(q)",), None, order, shape, read, remark=remark)
         return
     lines = (
         "J = path.jacob0(q)",
         "v = v[columns]",
         "J @ a[columns] + tensordot(path.hessian0(q, J0=J), v, (0, 0)) @ v",
     )
-    yield Calls(who, names, lines, order=order, remark=remark)
+    yield Calls(label, names, lines, order=order, remark=remark)
 
 
 #: Larger calls of PyTorch Kinematics take more time per configuration.
-_MOST = 20_000
+_MAX_BATCH = 20_000
 #: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
-_SINGLE = 1e-6
+_SINGLE_TOLERANCE = 1e-6
 
 
-def torch(subject: Subject, quantity: str) -> Iterator[Work]:
+def torch(workload: Workload, quantity: str) -> Iterator[TimedTask]:
     """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`.
 
     PyTorch Kinematics has no function for accelerations.
@@ -349,32 +360,32 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
 
     if quantity != "jacobian":
         return
-    chain = pk.build_serial_chain_from_urdf(subject.urdf, subject.frame).to(dtype=torch.float64)
-    columns = positions(subject.robot.joint_names, chain.get_joint_parameter_names())
-    n = min(subject.n, _MOST)
-    q = torch.from_numpy(np.ascontiguousarray(subject.q[:n, columns]))
+    chain = pk.build_serial_chain_from_urdf(workload.urdf, workload.frame).to(dtype=torch.float64)
+    columns = find_indices(workload.robot.joint_names, chain.get_joint_parameter_names())
+    n = min(workload.n, _MAX_BATCH)
+    q = torch.from_numpy(np.ascontiguousarray(workload.q[:n, columns]))
     remark = (
         "computes only the columns of the path's joints; reads angles with seven digits; uses all processors"
     )
 
-    def work(who: str, jacobian: Callable[[Any], Any]) -> Work:
+    def make_task(label: str, jacobian: Callable[[Any], Any]) -> TimedTask:
         def result() -> FloatArray:
-            return spread(jacobian(q).numpy(), columns, subject.nv)
+            return fill_columns(jacobian(q).numpy(), columns, workload.nv)
 
-        return Work(who, n, lambda: jacobian(q), result, _SINGLE, remark)
+        return TimedTask(label, n, lambda: jacobian(q), result, _SINGLE_TOLERANCE, remark)
 
-    yield work("PyTorch Kinematics", chain.jacobian)
+    yield make_task("PyTorch Kinematics", chain.jacobian)
     if shutil.which("g++"):  # `torch.compile` needs a C++ compiler.
-        yield work("PyTorch Kinematics, compiled", torch.compile(chain.jacobian_tensor))
+        yield make_task("PyTorch Kinematics, compiled", torch.compile(chain.jacobian_tensor))
 
 
-def jax(subject: Subject, quantity: str) -> Iterator[Work]:
+def jax(workload: Workload, quantity: str) -> Iterator[TimedTask]:
     """Yield the textbook's equations on JAX arrays, compiled for a batch by `vmap` and XLA."""
     import jax
     import jax.numpy as jnp
 
     jax.config.update("jax_enable_x64", True)  # All contenders compute in float64.
-    array, plan = jnp.asarray, subject.plan
+    array, plan = jnp.asarray, workload.plan
     eq = bind_equations(
         plus=lambda x, y: array(x) + array(y),
         minus=lambda x, y: array(x) - array(y),
@@ -389,14 +400,16 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
     def compute(q: Any, *rates: Any) -> Any:
         x = q[places_q]
         v, a = (u[places_v] for u in rates or (jnp.zeros(plan.nv),) * 2)
-        numbers = generated.results(plan, quantity, x, jnp.sin(x), jnp.cos(x), v, a, eq)
-        return jnp.stack([array(number, float) for number in numbers]).reshape(subject.width(quantity))
+        numbers = generated.frame_results(plan, quantity, x, jnp.sin(x), jnp.cos(x), v, a, eq)
+        return jnp.stack([array(number, float) for number in numbers]).reshape(
+            workload.result_shape(quantity)
+        )
 
     compiled = jax.jit(jax.vmap(compute))
-    inputs = [array(x) for x in subject.inputs(quantity, subject.n)]
-    yield Work(
+    inputs = [array(x) for x in workload.inputs(quantity, workload.n)]
+    yield TimedTask(
         "JAX, vmap and jit",
-        subject.n,
+        workload.n,
         lambda: compiled(*inputs).block_until_ready(),
         lambda: np.asarray(compiled(*inputs)),
         remark="uses all processors and JAX's own arrays",
@@ -404,16 +417,16 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 ALWAYS = (
-    Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_batches),
+    Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_tasks),
     Contender(
         "pin",
         "pinocchio",
-        lambda subject, quantity: iter([pinocchio_calls(subject.urdf, subject.frame, quantity)]),
-        pinocchio_batches,
+        lambda workload, quantity: iter([pinocchio_calls(workload.urdf, workload.frame, quantity)]),
+        pinocchio_tasks,
     ),
 )
 PEERS = (
-    Contender("casadi", "casadi", batches=generated.batches, program=generated.COMPILER),
+    Contender("casadi", "casadi", batches=generated.generated_tasks, program=generated.COMPILER),
     Contender("dynibo", "dynibo", dynibo),
     Contender("mujoco", "mujoco", mujoco),
     Contender("drake", "pydrake", drake),

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from scripts.benchmarking.subject import Subject
-from scripts.benchmarking.timing import Work
+from scripts.benchmarking.timing import TimedTask
+from scripts.benchmarking.workload import Workload
 from urdfkin.compiled import python_numbers
 from urdfkin.compiled.plan import CompiledTree, JointMotion, StepField
 from urdfkin.kinematics import equations
@@ -37,7 +37,7 @@ _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 _Z = (0.0, 0.0, 1.0)
 
 
-def results(
+def frame_results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
     """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
@@ -68,21 +68,21 @@ def _pose(row: FloatArray) -> tuple[Any, Any]:
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
 
-def batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    compute = compiled(subject, quantity)
-    inputs = subject.inputs(quantity, subject.n)
-    out = np.empty((subject.n, *subject.width(quantity)))
+def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
+    compute = compile_function(workload, quantity)
+    inputs = workload.inputs(quantity, workload.n)
+    out = np.empty((workload.n, *workload.result_shape(quantity)))
     addresses = [x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]]  # A Jacobian does not need v and a.
 
     def run() -> None:
-        compute(subject.n, *addresses, out.ctypes.data)
+        compute(workload.n, *addresses, out.ctypes.data)
 
-    yield Work(GENERATED, subject.n, run, lambda: out, remark=_REMARK)
+    yield TimedTask(GENERATED, workload.n, run, lambda: out, remark=_REMARK)
 
 
-def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
+def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
     """Return a function of the batch size and the addresses of q, v, a and the results."""
-    plan, folder = subject.plan, subject.folder
+    plan, folder = workload.plan, workload.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
         "Q_AT": plan.steps[:, StepField.Q],
@@ -90,13 +90,13 @@ def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
         "TURNS": turns.astype(int),
     }
     macros = {
-        **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": subject.numbers(quantity)},
+        **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": workload.result_size(quantity)},
         **{"MOVING": int(quantity == "acceleration"), "PI_2_REST": python_numbers.PI_2_REST},
-        **{name: _listed(getattr(python_numbers, name)) for name in ("SINE", "COSINE")},
+        **{name: _join(getattr(python_numbers, name)) for name in ("SINE", "COSINE")},
     }
     lines = [f"#define {name} {value}" for name, value in macros.items()]
-    lines += [f"static const int {name}[] = {{{_listed(at.tolist())}}};" for name, at in tables.items()]
-    lines.append(_straight_line(plan, quantity))
+    lines += [f"static const int {name}[] = {{{_join(at.tolist())}}};" for name, at in tables.items()]
+    lines.append(_generate_code(plan, quantity))
     (folder / f"{quantity}.h").write_text("\n".join(lines), "utf-8")
     library = folder / f"{quantity}.so"
     here = [f"-I{folder}", f'-DROBOT="{quantity}.h"', str(_FRAME), "-o", str(library)]
@@ -106,16 +106,16 @@ def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
     return function
 
 
-def _listed(numbers: Sequence[float]) -> str:
+def _join(numbers: Sequence[float]) -> str:
     return ", ".join(map(repr, numbers))
 
 
-def _straight_line(plan: CompiledTree, quantity: str) -> str:
+def _generate_code(plan: CompiledTree, quantity: str) -> str:
     """Return CasADi's C code of a function of (x, sines, cosines, v, a) for one configuration."""
     import casadi
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
-    numbers = results(plan, quantity, *map(casadi.vertsplit, names))
+    numbers = frame_results(plan, quantity, *map(casadi.vertsplit, names))
     function = casadi.Function("numbers", names, [casadi.vertcat(*numbers)], {"cse": True})
     generator = casadi.CodeGenerator("generated")
     generator.add(function)

@@ -22,7 +22,7 @@ from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
 #: Keys of the times of a first call: with an empty kernel cache, and with all kernels in the cache.
-EMPTY, KEPT = "empty_ms", "kept_ms"
+EMPTY, STORED = "empty_ms", "stored_ms"
 #: Number of inputs (q, v, a) of each quantity whose first call compiles a kernel.
 USES = {
     "placement": 1,
@@ -36,7 +36,7 @@ USES = {
 }
 
 
-def machine() -> dict[str, object]:
+def describe_machine() -> dict[str, object]:
     lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     entries = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
     flags = entries.get("flags", "").split()
@@ -51,22 +51,22 @@ def machine() -> dict[str, object]:
     }
 
 
-def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
+def measure_memory(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
     """Return the peak memory of computing `n` results, and the size of the results, in bytes."""
-    return _run_apart("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
+    return _run_in_process("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
 
 
-def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
+def measure_first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Yield the processor time of each quantity's first call, with an empty and with a full kernel cache."""
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:
             words = "first", robot, frame, *what.split(" + ")
-            times = {key: _run_apart(*words, cache=folder)["ms"] for key in (EMPTY, KEPT)}
+            times = {key: _run_in_process(*words, cache=folder)["ms"] for key in (EMPTY, STORED)}
         yield {"robot": robot, "what": "all of them" if what == together else what, **times}
 
 
-def _run_apart(*words: str, cache: str | None = None) -> dict[str, Any]:
+def _run_in_process(*words: str, cache: str | None = None) -> dict[str, Any]:
     command = [sys.executable, "-m", "scripts.benchmarking.machine", *words]
     environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
     done = subprocess.run(command, cwd=ROOT, capture_output=True, check=True, env=environment)
@@ -74,15 +74,15 @@ def _run_apart(*words: str, cache: str | None = None) -> dict[str, Any]:
     return result
 
 
-def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:
+def _time_first_calls(robot: str, frame: str, *uses: str) -> dict[str, object]:
     model = urdfkin.load(robot, verify=False, mimic=False)
     begin = time.process_time()
     for use in uses:
-        _use(model, frame, use)
+        _call_once(model, frame, use)
     return {"ms": round(1e3 * (time.process_time() - begin), 1)}
 
 
-def _use(model: Robot, frame: str, use: str) -> None:
+def _call_once(model: Robot, frame: str, use: str) -> None:
     inputs = [np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)][: USES[use]]
     of_prepared, _, name = use.rpartition(".")
     with use_only("compiled"):
@@ -92,29 +92,29 @@ def _use(model: Robot, frame: str, use: str) -> None:
             getattr(model, name)(*inputs, frame, verify=False)
 
 
-def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
-    from scripts.benchmarking.subject import Subject
+def _measure_peak(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
+    from scripts.benchmarking.workload import Workload
 
     n = int(count)
-    with Subject(robot, frame, n) as subject:
-        method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, n)
-        out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
+    with Workload(robot, frame, n) as workload:
+        method, inputs = getattr(workload.robot, quantity), workload.inputs(quantity, n)
+        out = np.ones((n, *workload.result_shape(quantity))) if kind == "out" else None
         few = tuple(x[:64] for x in inputs)
         with use_only("compiled"):
             method(*few, frame, verify=False, threads=2)  # This call loads compiled code and starts threads.
         Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
-        before = _bytes("VmRSS")
+        before = _read_bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
-        taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
+        taken = _read_bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
     sizes = {"output_bytes": result.nbytes, "peak_bytes": taken}
     return {"robot": robot, "quantity": quantity, "n": n, "out": kind == "out", **sizes}
 
 
-def _bytes(entry: str) -> int:
+def _read_bytes(entry: str) -> int:
     lines = Path("/proc/self/status").read_text("utf-8").splitlines()
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(entry))
 
 
 if __name__ == "__main__":
     question, *given = sys.argv[1:]
-    print(json.dumps(_first(*given) if question == "first" else _memory(*given)))
+    print(json.dumps(_time_first_calls(*given) if question == "first" else _measure_peak(*given)))

@@ -40,14 +40,14 @@ class Number:
     constant: int | None = None
     #: If true, no result needs the number. Operations with such a number are not counted.
     unused: bool = False
-    made_of: tuple[Number, ...] = ()
+    operands: tuple[Number, ...] = ()
 
     def __add__(self, other: Number) -> Number:
         if self.unused or other.unused:
             return self if self.unused else other
         if self.constant == 0 or other.constant == 0:
             return other if self.constant == 0 else self
-        return Number(made_of=(self, other))
+        return Number(operands=(self, other))
 
     __sub__ = __add__
 
@@ -58,7 +58,7 @@ class Number:
             return other if self.constant else self
         if other.constant is not None:
             return self if other.constant else other
-        return Number(made_of=(self, other))
+        return Number(operands=(self, other))
 
     def __rmul__(self, other: int) -> Number:
         return self * Number()
@@ -70,22 +70,22 @@ class Number:
         return self
 
 
-def count(results: Any) -> int:
+def count_shared(results: Any) -> int:
     """Return the number of operations that compute these results; a shared operation counts once."""
     waiting, visited = [results], set[Number]()
     while waiting:
         value = waiting.pop()
         if isinstance(value, Number):
-            if value.made_of and value not in visited:
+            if value.operands and value not in visited:
                 visited.add(value)
-                waiting += value.made_of
+                waiting += value.operands
         elif isinstance(value, tuple | list):
             waiting += value
     return len(visited)
 
 
 @dataclass
-class _Walk:
+class _RecordedRecursion:
     """The functions of the forward recursion, called with `Number` so that operations can be counted."""
 
     written: list[Any] = field(default_factory=list)
@@ -120,32 +120,34 @@ class _Walk:
         self.state = (triple, triple, triple), triple, triple, triple, triple, triple
 
 
-def operations(plan: CompiledTree, quantity: str) -> int:
+def count_operations(plan: CompiledTree, quantity: str) -> int:
     """Count operations for one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
     columns = quantity == "jacobian"
-    program, run = compile_program(plan, orientations=False, columns=columns), _Walk()
+    program, run = compile_program(plan, orientations=False, columns=columns), _RecordedRecursion()
     words: list[int] = program.words.tolist()
     angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
     output = {"jacobian": "placement"}.get(quantity, quantity)
     state = getattr(run.call, f"mask_for_{output}")(run.state)
     total, at = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
     while words[at] != Op.END:
-        total += _cost(run, words[at : at + INSTRUCTION_WIDTH], quantity, state)
+        total += _count_instruction(run, words[at : at + INSTRUCTION_WIDTH], quantity, state)
         at += INSTRUCTION_WIDTH
     return total
 
 
-def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, ...]) -> int:
+def _count_instruction(
+    run: _RecordedRecursion, instruction: list[int], quantity: str, state: tuple[Any, ...]
+) -> int:
     op, row, _, flags, c = instruction
     run.written.clear()
     world = run.call.world_axes
     if op <= Op.ROTATE:
-        return count(run.call._execute_transform(world, op, state, None, c))
+        return count_shared(run.call._execute_transform(world, op, state, None, c))
     if op <= Op.FLOATING:
-        return count(run.call._execute_joint(world, op, state, None, row, 0, 0, flags, None, c))
+        return count_shared(run.call._execute_joint(world, op, state, None, row, 0, 0, flags, None, c))
     if op == Op.COLUMN:
         run.call.write_jacobian_column(None, row % AXIS_ROWS, 0, flags, None, c, 2, state)
     elif op == Op.WRITE and quantity != "jacobian":
         write = run.call.write_velocity if quantity == "velocity" else run.call.write_acceleration
         write(1, None, [1] * len(ProgramHeader), 0, 0, 0, 2, state, None)
-    return count(run.written)
+    return count_shared(run.written)

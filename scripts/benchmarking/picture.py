@@ -29,30 +29,32 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])
-            _bars(bars, _chosen(rows, "batch", quantity), quantity)
+            _draw_bars(bars, _select_rows(rows, "batch", quantity), quantity)
         if rows:
             bars.legend(frameon=False, loc="upper right")
-        _growth(figure.add_subplot(grid[2, 0]), rows, "joints", "joints of a chain", "joint")
-        _growth(figure.add_subplot(grid[2, 1]), rows, "sizes", "configurations in a batch", "configuration")
-        return _light(save(figure, path)) if path.suffix == ".svg" else save(figure, path)
+        _draw_growth(figure.add_subplot(grid[2, 0]), rows, "joints", "joints of a chain", "joint")
+        _draw_growth(
+            figure.add_subplot(grid[2, 1]), rows, "sizes", "configurations in a batch", "configuration"
+        )
+        return _shrink_svg(save(figure, path)) if path.suffix == ".svg" else save(figure, path)
 
 
-def _light(svg: bytes) -> bytes:
+def _shrink_svg(svg: bytes) -> bytes:
     """Remove comments, indentation and fallback fonts."""
     text = re.sub(r"<!--.*?-->", "", svg.decode(), flags=re.DOTALL)
     text = re.sub(r"('DejaVu Sans'|DejaVu Sans)(, [^;\"]*)?", "sans-serif", text)
     return re.sub(r"\s*\n\s*", "\n", text).encode()
 
 
-def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
+def _select_rows(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 
 
-def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
+def _draw_bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
-    names = [row["who"] for row in ordered]
+    names = [row["label"] for row in ordered]
     kinds = [next(word for word in KINDS if name.startswith(word)) for name in names]
     for word, (colour, hatch, name) in KINDS.items():
         places = [i for i, kind in enumerate(kinds) if kind == word]
@@ -67,19 +69,19 @@ def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
     axes.set_xlabel("time [ns]")
     axes.set_xscale("log")
     axes.set_xlim(0.5 * min(costs, default=1.0), 6 * max(costs, default=1.0))
-    _plain_powers(axes)
+    _format_ticks(axes)
     robot = rows[0]["robot"] if rows else ""
     axes.set_title(f"{robot}, {TITLES[quantity]}: time for one configuration", loc="left", fontsize=12)
 
 
-def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str) -> None:
+def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str) -> None:
     for quantity, (mark, line) in MARKS.items():
-        chosen = [row for row in _chosen(rows, section, quantity) if row["who"].startswith("urdfkin")]
+        chosen = [row for row in _select_rows(rows, section, quantity) if row["label"].startswith("urdfkin")]
         sizes = [row["size"] for row in chosen]
         costs = [row["median_ns"] / (row["size"] if section == "joints" else 1) for row in chosen]
         axes.plot(sizes, costs, color=BLUE, marker=mark, linestyle=line, label=TITLES[quantity])
     axes.set_xscale("log")
-    _plain_powers(axes)
+    _format_ticks(axes)
     if sizes := sorted({row["size"] for row in rows if row["section"] == section}):
         axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
     axes.set_ylim(0.0, 1.1 * max(float(axes.dataLim.y1), 1.0) if rows else None)
@@ -89,6 +91,6 @@ def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str
     axes.legend(frameon=False)
 
 
-def _plain_powers(axes: Any) -> None:
+def _format_ticks(axes: Any) -> None:
     axes.xaxis.set_major_formatter(lambda x, _: f"{x:,.0f}" if x >= 1 else f"{x:g}")
     axes.minorticks_off()

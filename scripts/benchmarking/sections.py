@@ -16,12 +16,12 @@ from scripts.benchmarking.contenders import (
     Contender,
     all_joints_calls,
     pinocchio_calls,
-    urdfkin_batches,
     urdfkin_calls,
+    urdfkin_tasks,
 )
-from scripts.benchmarking.operations import operations
-from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
-from scripts.benchmarking.timing import Calls, Row, Work, agree, measure, times
+from scripts.benchmarking.operations import count_operations
+from scripts.benchmarking.timing import Calls, Row, TimedTask, check_agreement, measure_rows, measure_times
+from scripts.benchmarking.workload import QUANTITIES, ROBOT_FRAMES, TIP, Workload, chain_urdf
 from urdfkin.compiled.evaluate import make_kernel_args, uses_buffer
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.single import make_single_evaluator
@@ -36,90 +36,99 @@ ALL_JOINTS = "Pinocchio's calls for all joints, results stored"
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
 
 
-def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
+def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
     """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
 
     The section `batch` measures batches, and `single` measures calls for one configuration. The section
     `checked` measures urdfkin's calls for one configuration with a check of each result. The section
     `verified` measures batches with a check of all results, of a sample of the results, or of no result.
     """
-    for subject, quantity, table in _contests(section, n):
-        what = f"{subject.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
-        calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
-        loop = calls.batch(subject, quantity)
+    for workload, quantity, table in _open_workloads(section, n):
+        what = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
+        calls = pinocchio_calls(workload.urdf, workload.frame, quantity)
+        loop = calls.make_batch_task(workload, quantity)
         if section == "batch":
-            works = [work for contender in contenders for work in contender.works(subject, quantity)]
-            loop = next(work for work in works if work.who == PROCESSES)
-            baseline = next(work for work in works if work.who == LOOP)
+            tasks = [task for contender in contenders for task in contender.make_tasks(workload, quantity)]
+            loop = next(task for task in tasks if task.label == PROCESSES)
+            baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "single":
-            found = [one for contender in contenders for one in contender.singles(subject, quantity)]
-            works = [one.single(subject, quantity) for one in found]
-            baseline = next(work for work in works if work.who == LOOP)
+            found = [
+                one for contender in contenders for one in contender.make_single_calls(workload, quantity)
+            ]
+            tasks = [one.make_single_task(workload, quantity) for one in found]
+            baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "checked":
-            checked = urdfkin_calls(subject, quantity, verify=True)
-            works = [one.single(subject, quantity) for one in (*checked, calls)]
-            baseline = works[-1]
+            checked = urdfkin_calls(workload, quantity, verify=True)
+            tasks = [one.make_single_task(workload, quantity) for one in (*checked, calls)]
+            baseline = tasks[-1]
         else:
-            baseline = loop = replace(loop, who=STORED)
-            works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), loop]
-            works.append(replace(calls.single(subject, quantity), who=NOT_STORED))
+            baseline = loop = replace(loop, label=STORED)
+            tasks = [
+                *(_make_checked_task(workload, quantity, verify) for verify in (True, "sample", False)),
+                loop,
+            ]
+            tasks.append(replace(calls.make_single_task(workload, quantity), label=NOT_STORED))
             if quantity == "jacobian":
-                works.append(replace(all_joints_calls(subject).batch(subject, quantity), who=ALL_JOINTS))
-        agree(works, loop, what)
+                tasks.append(
+                    replace(all_joints_calls(workload).make_batch_task(workload, quantity), label=ALL_JOINTS)
+                )
+        check_agreement(tasks, loop, what)
         clock = time.perf_counter if section in ("batch", "single") else time.thread_time
-        yield from measure(table, works, rounds, baseline, clock)
+        yield from measure_rows(table, tasks, rounds, baseline, clock)
 
 
 def operation_counts() -> Iterator[tuple[str, int]]:
-    for subject, quantity, _ in _contests("operations", 1):
-        yield f"{subject.name}, {quantity}", operations(subject.plan, quantity)
+    for workload, quantity, _ in _open_workloads("operations", 1):
+        yield f"{workload.name}, {quantity}", count_operations(workload.plan, quantity)
 
 
-def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
-    method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, subject.loop)
-    out = np.empty((subject.loop, *subject.width(quantity)))
-    compute = partial(method, *inputs, subject.frame, out=out, verify=verify)
-    return Work(f"urdfkin, verify={verify!r}", subject.loop, compute, lambda: out)
+def _make_checked_task(workload: Workload, quantity: str, verify: bool | str) -> TimedTask:
+    method, inputs = getattr(workload.robot, quantity), workload.inputs(quantity, workload.loop)
+    out = np.empty((workload.loop, *workload.result_shape(quantity)))
+    compute = partial(method, *inputs, workload.frame, out=out, verify=verify)
+    return TimedTask(f"urdfkin, verify={verify!r}", workload.loop, compute, lambda: out)
 
 
-def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Row]]:
-    for source in SUBJECTS:
-        with Subject(*source, n) as subject:
+def _open_workloads(section: str, n: int) -> Iterator[tuple[Workload, str, Row]]:
+    for source in ROBOT_FRAMES:
+        with Workload(*source, n) as workload:
             for quantity in QUANTITIES:
-                yield subject, quantity, _table(section, subject, quantity)
+                yield workload, quantity, _make_row(section, workload, quantity)
 
 
-def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Row:
-    return Row(section, subject.name, quantity, subject.numbers(quantity), size)
+def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) -> Row:
+    return Row(section, workload.name, quantity, workload.result_size(quantity), size)
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains of joints; the Jacobians of a batch contain about `numbers` elements."""
     for size in joints:
         n = max(numbers // (6 * size), 16)
-        with Subject(chain_urdf(size), TIP, n, name=f"chain of {size}") as subject:
-            yield from _growth("joints", subject, size, rounds)
+        with Workload(chain_urdf(size), TIP, n, name=f"chain of {size}") as workload:
+            yield from _growth_rows("joints", workload, size, rounds)
 
 
 def size_rows(sizes: Sequence[int], rounds: int) -> Iterator[Row]:
     for size in sizes:
-        with Subject(*SUBJECTS[0], size) as subject:
-            yield from _growth("sizes", subject, size, rounds)
+        with Workload(*ROBOT_FRAMES[0], size) as workload:
+            yield from _growth_rows("sizes", workload, size, rounds)
 
 
-def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[Row]:
+def _growth_rows(section: str, workload: Workload, size: int, rounds: int) -> Iterator[Row]:
     for quantity in QUANTITIES:
-        works = [work for work in urdfkin_batches(subject, quantity) if work.who in (ONE, FLOOR)]
-        pinocchio = pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
-        works += [pinocchio] * (section == "joints")
-        agree(works, pinocchio, f"{subject.name}, {quantity}, {size} {section}")
+        tasks = [task for task in urdfkin_tasks(workload, quantity) if task.label in (ONE, FLOOR)]
+        pinocchio = pinocchio_calls(workload.urdf, workload.frame, quantity).make_batch_task(
+            workload, quantity
+        )
+        tasks += [pinocchio] * (section == "joints")
+        check_agreement(tasks, pinocchio, f"{workload.name}, {quantity}, {size} {section}")
         baseline = pinocchio if section == "joints" else None
-        yield from measure(_table(section, subject, quantity, size), works, rounds, baseline)
+        yield from measure_rows(_make_row(section, workload, quantity, size), tasks, rounds, baseline)
 
 
 def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
-    with Subject(*SUBJECTS[-1], n) as subject:
-        robot, q, links = subject.robot, subject.q, subject.robot.link_names
+    with Workload(*ROBOT_FRAMES[-1], n) as workload:
+        robot, q, links = workload.robot, workload.q, workload.robot.link_names
         for count in sorted({min(count, len(links)) for count in counts}):
             frames = [f"link:{links[i]}" for i in np.linspace(0, len(links) - 1, count).astype(int)]
             out, every = np.empty((count, n, 4, 4)), np.empty((n, count, 4, 4))
@@ -130,10 +139,10 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
                     robot.placement(q, frame, out=out[k], threads=1, verify=False)
                 return out.swapaxes(0, 1)
 
-            works = [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, apart)]
-            agree(works, works[1], f"{subject.name}, {count} placements")
-            table = Row("frames", subject.name, "placement", 16 * count, count)
-            yield from measure(table, works, rounds, works[1])
+            tasks = [TimedTask(ONE_PASS, n, together, together), TimedTask(ONE_BY_ONE, n, apart, apart)]
+            check_agreement(tasks, tasks[1], f"{workload.name}, {count} placements")
+            table = Row("frames", workload.name, "placement", 16 * count, count)
+            yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
 # The time of a step of a batch is the difference between the times of two kernels.
@@ -152,21 +161,24 @@ PARTS: Mapping[str, frozenset[Op]] = {
 }
 
 
-def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
+def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
     """Yield the time of each step of a batch, in ns for one configuration."""
-    for subject, quantity, _ in _contests("where", n):
-        program = compile_program(subject.plan, orientations=False, columns=quantity == "jacobian")
-        works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
+    for workload, quantity, _ in _open_workloads("where", n):
+        program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
+        tasks = [
+            _make_kernel_task(workload, quantity, truncate_program(program, end), part)
+            for end, part in enumerate(PARTS, start=1)
+        ]
         if quantity == "acceleration":
-            works = [work for work in works if work.who != "columns"]
-        found = times(works, rounds)
+            tasks = [task for task in tasks if task.label != "columns"]
+        found = measure_times(tasks, rounds)
         before, parts = np.zeros(rounds), {}
-        for who, taken in found.items():
-            parts[who], before = taken - before, taken
-        yield _entry("batch", subject, quantity, parts, before)
+        for label, taken in found.items():
+            parts[label], before = taken - before, taken
+        yield _make_entry("batch", workload, quantity, parts, before)
 
 
-def cut(program: KernelProgram, parts: int) -> KernelProgram:
+def truncate_program(program: KernelProgram, parts: int) -> KernelProgram:
     """Return a program with only the instructions of its first `parts` steps."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
@@ -179,29 +191,31 @@ def cut(program: KernelProgram, parts: int) -> KernelProgram:
     return replace(program, words=words)
 
 
-def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> Work:
-    inputs = [FIXED_BASE_STATE, *subject.inputs(quantity, subject.n)]
-    out = np.empty((subject.n, *subject.width(quantity)))
-    buffered = who == "writing results" and uses_buffer(out)
-    task, memory = make_kernel_args(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered)
+def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram, label: str) -> TimedTask:
+    inputs = [FIXED_BASE_STATE, *workload.inputs(quantity, workload.n)]
+    out = np.empty((workload.n, *workload.result_shape(quantity)))
+    buffered = label == "writing results" and uses_buffer(out)
+    kernel_args, memory = make_kernel_args(
+        program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, buffered=buffered
+    )
     core = getattr(kernels, f"{quantity}s")
     owners = program, memory, out, inputs  # The kernel arguments contain the addresses of these arrays.
 
     def compute(_: object = owners) -> None:
-        core(task.ctypes.data)
+        core(kernel_args.ctypes.data)
 
     compute()
-    return Work(who, subject.n, compute)
+    return TimedTask(label, workload.n, compute)
 
 
-def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
+def call_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
     """Yield the time (ns) of each step of a call for one configuration."""
-    for subject, quantity, _ in _contests("where", n):
-        calls = list(_calls(subject, quantity))
-        works = [call.single(subject, quantity) for call in calls]
-        for work in works:
-            work.compute()
-        loop, function, refused, array, computed, prepared, method = times(works, rounds).values()
+    for workload, quantity, _ in _open_workloads("where", n):
+        calls = list(_calls(workload, quantity))
+        tasks = [call.make_single_task(workload, quantity) for call in calls]
+        for task in tasks:
+            task.compute()
+        loop, function, refused, array, computed, prepared, method = measure_times(tasks, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
             "call from this method to the forward recursion": refused - loop,
@@ -210,10 +224,10 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
             "NumPy's new array": array - loop,
             "rest of the robot's method": method - prepared - (array - loop),
         }
-        yield _entry("single", subject, quantity, parts, method - loop)
+        yield _make_entry("single", workload, quantity, parts, method - loop)
 
 
-class _Empty:
+class _NoOperation:
     def jacobian(self, q: object, out: object = None) -> object:
         return out
 
@@ -221,18 +235,18 @@ class _Empty:
         return out
 
 
-def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
+def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
     q_v_a = "q" if quantity == "jacobian" else "q, v, a"
-    compute, _ = make_single_evaluator(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
+    compute, _ = make_single_evaluator(quantity, workload.plan, Reference.LOCAL_WORLD_ALIGNED)
     names = {
-        "robot": subject.robot,
-        "fast": subject.robot.prepare(subject.frame),
-        "frame": subject.frame,
-        "function": getattr(_Empty(), quantity),
+        "robot": workload.robot,
+        "fast": workload.robot.prepare(workload.frame),
+        "frame": workload.frame,
+        "function": getattr(_NoOperation(), quantity),
         "compute": compute,
         "empty": np.empty,
-        "shape": subject.width(quantity),
-        "out": np.empty(subject.width(quantity)),
+        "shape": workload.result_shape(quantity),
+        "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
         "q",  # A line without a call measures the time of the loop.
@@ -246,8 +260,8 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         yield Calls(line, names, (line,))
 
 
-def _entry(
-    kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
+def _make_entry(
+    kind: str, workload: Workload, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
     """Return the median time of each step over all rounds.
 
@@ -255,4 +269,4 @@ def _entry(
     """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
-    return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}
+    return {"kind": kind, "robot": workload.name, "quantity": quantity, "ns": ns, "parts": medians}

@@ -8,8 +8,8 @@ from typing import Any
 
 from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
-from scripts.benchmarking.machine import EMPTY, KEPT
-from scripts.pages import inserted
+from scripts.benchmarking.machine import EMPTY, STORED
+from scripts.pages import insert_parts
 from scripts.pages import table as markdown
 
 #: The measurements of one contender, as a mapping.
@@ -22,36 +22,36 @@ _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
         lambda row: {
-            "": f"{row['quantity']}, {row['who']}",
+            "": f"{row['quantity']}, {row['label']}",
             "joints": str(row["size"]),
-            "ns for one configuration": number(row["median_ns"]),
-            "ns per joint": number(row["median_ns"] / row["size"]),
-            "ns per number of the output": number(row["median_ns"] / row["numbers"]),
+            "ns for one configuration": format_number(row["median_ns"]),
+            "ns per joint": format_number(row["median_ns"] / row["size"]),
+            "ns per number of the output": format_number(row["median_ns"] / row["numbers"]),
         },
     ),
     "frames": (
         "{robot}: placements of several links, one thread",
         lambda row: {
-            "": row["who"],
+            "": row["label"],
             "links": str(row["size"]),
-            "ns for one configuration": number(row["median_ns"]),
-            "ns per link": number(row["median_ns"] / row["size"]),
+            "ns for one configuration": format_number(row["median_ns"]),
+            "ns per link": format_number(row["median_ns"] / row["size"]),
         },
     ),
     "sizes": (
         "{robot}: batches of several sizes, one thread, out= given",
         lambda row: {
-            "": f"{row['quantity']}, {row['who']}",
+            "": f"{row['quantity']}, {row['label']}",
             "configurations": f"{row['size']:,}",
-            "ns for one configuration, median": number(row["median_ns"]),
-            "minimum": number(row["minimum_ns"]),
+            "ns for one configuration, median": format_number(row["median_ns"]),
+            "minimum": format_number(row["minimum_ns"]),
         },
     ),
 }
 
 
 @dataclass(frozen=True)
-class Words:
+class TextTable:
     """A table as text; each entry of `cells` maps the headings to the cells of a row."""
 
     section: str
@@ -74,58 +74,64 @@ class Words:
         return f"**{self.title}**\n\n{cells}"
 
 
-def number(x: float) -> str:
+def format_number(x: float) -> str:
     """Format a number with three digits and without an exponent."""
     digits = 2 if abs(x) < 10 else 1 if abs(x) < 100 else 0
     return f"{x:,.{digits}f}"
 
 
-def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
+def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
     sections: dict[str, list[Entry]] = {}
     for row in figures["rows"]:
         sections.setdefault(row["section"], []).append(row)
     for section in (name for name in sections if name in ("batch", "single", "checked", "verified")):
-        for title, rows in _groups(sections[section]):
-            yield _contest(section, title, rows)
+        for title, rows in _group_rows(sections[section]):
+            yield _make_contender_table(section, title, rows)
     if batch := sections.get("batch"):
-        yield Words("summary", "urdfkin against the others, medians", [_best(*one) for one in _groups(batch)])
+        yield TextTable(
+            "summary",
+            "urdfkin against the others, medians",
+            [_compare_with_best(*one) for one in _group_rows(batch)],
+        )
         title = "lower limits of the time for one configuration, by memory and by arithmetic"
-        yield Words("floor", title, [_floor(*one, figures["operations"]) for one in _groups(batch)])
+        yield TextTable(
+            "floor", title, [_compare_with_limits(*one, figures["operations"]) for one in _group_rows(batch)]
+        )
     for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
-            yield _where(f"{what}: where the time goes, ns for one configuration", chosen)
+            yield _make_step_table(f"{what}: where the time goes, ns for one configuration", chosen)
     if entries := figures.get("first"):
-        heads = {"without stored kernels": EMPTY, "with stored kernels": KEPT}
+        heads = {"without stored kernels": EMPTY, "with stored kernels": STORED}
         times = [
-            {"": one["what"], **{head: number(one[key] / 1e3) for head, key in heads.items()}}
+            {"": one["what"], **{head: format_number(one[key] / 1e3) for head, key in heads.items()}}
             for one in entries
         ]
-        yield Words("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
+        yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
             # Rows are grouped by quantity, then by contender; groups are in the order of their first rows.
-            keys = [(row["quantity"], row["who"]) for row in rows]
+            keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
-            rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["who"])))
+            rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))
             rows = sorted(rows, key=lambda row: quantities.index(row["quantity"]))
-            yield Words(section, title.format(robot=rows[0]["robot"]), [cells(row) for row in rows])
+            yield TextTable(section, title.format(robot=rows[0]["robot"]), [cells(row) for row in rows])
     if figures["memory"]:
-        yield _memory(figures["memory"])
+        yield _make_memory_table(figures["memory"])
 
 
-def page(text: str, figures: Mapping[str, Any]) -> str:
+def make_page(text: str, figures: Mapping[str, Any]) -> str:
     """Return the page with the figures inserted; raise ValueError if a place is missing or occurs twice."""
-    parts: dict[str, list[str]] = {"machine": [machine_of(figures)]}
-    for words in tables(figures):
+    parts: dict[str, list[str]] = {"machine": [format_machine(figures)]}
+    for words in make_tables(figures):
         parts.setdefault(words.section, []).append(words.text)
     places = re.findall(r"<!-- figures: (\w+) -->", text)
     if set(parts) - set(places) or len(places) != len(set(places)):
         raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
     texts = {place: "\n\n".join(parts.get(place, [NOT_MEASURED])) for place in places}
-    return inserted(text, **{f"figures: {place}": part for place, part in texts.items()})
+    return insert_parts(text, **{f"figures: {place}": part for place, part in texts.items()})
 
 
-def machine_of(figures: Mapping[str, Any]) -> str:
+def format_machine(figures: Mapping[str, Any]) -> str:
     machine, versions = figures["machine"], figures["versions"]
     libraries = figures["libraries"] | {name: versions[name] for name in ("numpy", "numba")}
     return (
@@ -136,92 +142,94 @@ def machine_of(figures: Mapping[str, Any]) -> str:
     )
 
 
-def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
+def _group_rows(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
     for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
         yield f"{robot}, {quantity}", list(group)
 
 
-def _contest(section: str, title: str, rows: list[Entry]) -> Words:
+def _make_contender_table(section: str, title: str, rows: list[Entry]) -> TextTable:
     cost, single = section in ("checked", "verified"), section in ("single", "checked")
     what = "calls" if single else "results stored" if cost else "loop"
     ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {what}"
     remarks = list(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
-    ceiling = _generated(rows)
+    ceiling = _generated_time(rows)
     cells = [
         {
-            "": row["who"] + (f" [{remarks.index(row['remark']) + 1}]" if row["remark"] else ""),
-            "median": number(row["median_ns"]),
-            "minimum": number(row["minimum_ns"]),
-            ratio: number(1 / row["ratio"] if cost else row["ratio"]),
-            **({_SHARE: number(ceiling / row["median_ns"])} if ceiling else {}),
+            "": row["label"] + (f" [{remarks.index(row['remark']) + 1}]" if row["remark"] else ""),
+            "median": format_number(row["median_ns"]),
+            "minimum": format_number(row["minimum_ns"]),
+            ratio: format_number(1 / row["ratio"] if cost else row["ratio"]),
+            **({_SHARE: format_number(ceiling / row["median_ns"])} if ceiling else {}),
             "configurations per call": f"{1 if single else row['n']:,}",
         }
         for row in rows
     ]
-    return Words(section, f"{title}: {rows[0]['numbers']} numbers, ns for one configuration", cells, remarks)
+    return TextTable(
+        section, f"{title}: {rows[0]['numbers']} numbers, ns for one configuration", cells, remarks
+    )
 
 
-def _generated(rows: Sequence[Entry]) -> float | None:
-    return next((float(row["median_ns"]) for row in rows if row["who"] == GENERATED), None)
+def _generated_time(rows: Sequence[Entry]) -> float | None:
+    return next((float(row["median_ns"]) for row in rows if row["label"] == GENERATED), None)
 
 
-def _best(title: str, group: list[Entry]) -> dict[str, str]:
+def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
     """Compare urdfkin, with one thread and with all threads, with the fastest other contender."""
-    who = {row["who"]: row for row in group}
-    several = next((row for row in group if _SEVERAL.fullmatch(row["who"])), None)
-    one, ceiling = float(who[ONE]["median_ns"]), _generated(group)
-    others = [row for row in group if not row["who"].startswith(("urdfkin", FLOOR, GENERATED))]
+    rows = {row["label"]: row for row in group}
+    several = next((row for row in group if _SEVERAL.fullmatch(row["label"])), None)
+    one, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
+    others = [row for row in group if not row["label"].startswith(("urdfkin", FLOOR, GENERATED))]
     best = min(others, key=lambda row: float(row["median_ns"]))
-    compiled = number(who[COMPILED]["ratio"]) if COMPILED in who else "not measured"
+    compiled = format_number(rows[COMPILED]["ratio"]) if COMPILED in rows else "not measured"
     return {
         "": title,
-        "1 thread, ns": number(one),
-        "speed relative to Pinocchio's loop": number(who[ONE]["ratio"]),
-        "relative speed with all threads": number(several["ratio"]) if several else "one processor",
+        "1 thread, ns": format_number(one),
+        "speed relative to Pinocchio's loop": format_number(rows[ONE]["ratio"]),
+        "relative speed with all threads": format_number(several["ratio"]) if several else "one processor",
         "relative speed compiled for this robot, 1 thread": compiled,
-        _SHARE: number(ceiling / one) if ceiling else "not measured",
-        "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
-        "speed of urdfkin, 1 thread, relative to this library": number(best["median_ns"] / one),
+        _SHARE: format_number(ceiling / one) if ceiling else "not measured",
+        "fastest other library, ns": f"{best['label']}, {format_number(best['median_ns'])}",
+        "speed of urdfkin, 1 thread, relative to this library": format_number(best["median_ns"] / one),
     }
 
 
-def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
+def _compare_with_limits(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
     """Compare urdfkin's time with two lower limits: to write the output, and to do the arithmetic."""
-    who = {row["who"].partition(",")[0]: row for row in reversed(group)}
-    fill, ns = who[FLOOR], who["urdfkin"]["median_ns"]
+    rows = {row["label"].partition(",")[0]: row for row in reversed(group)}
+    fill, ns = rows[FLOOR], rows["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]
     return {
         "": title,
         "bytes written": f"{size:,}",
-        "fill, ns": number(fill["median_ns"]),
+        "fill, ns": format_number(fill["median_ns"]),
         "operations": f"{operations[title]:,}",
-        "urdfkin, 1 thread, ns": number(ns),
-        "bytes per ns": number(size / ns),
-        "operations per ns": number(operations[title] / ns),
+        "urdfkin, 1 thread, ns": format_number(ns),
+        "bytes per ns": format_number(size / ns),
+        "operations per ns": format_number(operations[title] / ns),
     }
 
 
-def _where(title: str, entries: Sequence[Entry]) -> Words:
+def _make_step_table(title: str, entries: Sequence[Entry]) -> TextTable:
     def cell(entry: Entry, part: str) -> str:
         ns = entry["parts"].get(part)
-        return "" if ns is None else f"{number(ns)} ({100 * ns / entry['ns']:.0f} %)"
+        return "" if ns is None else f"{format_number(ns)} ({100 * ns / entry['ns']:.0f} %)"
 
     columns = {f"{entry['robot']}, {entry['quantity']}": entry for entry in entries}
     parts = dict.fromkeys(part for entry in entries for part in entry["parts"])
     cells = [{"": part} | {name: cell(entry, part) for name, entry in columns.items()} for part in parts]
-    cells.append({"": "total"} | {name: number(entry["ns"]) for name, entry in columns.items()})
-    return Words("where", title, cells)
+    cells.append({"": "total"} | {name: format_number(entry["ns"]) for name, entry in columns.items()})
+    return TextTable("where", title, cells)
 
 
-def _memory(entries: list[Entry]) -> Words:
+def _make_memory_table(entries: list[Entry]) -> TextTable:
     cells = [
         {
             "": f"{entry['quantity']}, {'out= given' if entry['out'] else 'no out='}",
             "configurations": f"{entry['n']:,}",
-            "output, MB": number(entry["output_bytes"] / 1e6),
-            "peak, MB": number(entry["peak_bytes"] / 1e6),
+            "output, MB": format_number(entry["output_bytes"] / 1e6),
+            "peak, MB": format_number(entry["peak_bytes"] / 1e6),
             "beyond the output": f"{100 * (entry['peak_bytes'] / entry['output_bytes'] - 1):.1f} %",
         }
         for entry in entries
     ]
-    return Words("memory", f"{entries[0]['robot']}: memory of a batch, output included", cells)
+    return TextTable("memory", f"{entries[0]['robot']}: memory of a batch, output included", cells)

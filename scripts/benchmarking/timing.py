@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.benchmarking.subject import Subject
+from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
 #: Allowed difference (m, rad, m/s^2, rad/s^2) between contenders; it is much larger than rounding.
@@ -22,10 +22,10 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Work:
-    """A timed task; `compute` uses the first `n` configurations of the subject."""
+class TimedTask:
+    """A timed task; `compute` uses the first `n` configurations of the workload."""
 
-    who: str
+    label: str
     n: int
     compute: Callable[[], object]
     #: Function that returns the results in urdfkin's conventions; None if there is nothing to compare.
@@ -47,7 +47,7 @@ class Row:
     quantity: str
     numbers: int
     size: int = 0
-    who: str = ""
+    label: str = ""
     n: int = 0
     median_ns: float = 0.0
     minimum_ns: float = 0.0
@@ -60,67 +60,67 @@ class DifferenceError(Exception):
     """The results of contenders differ, so their times are not comparable."""
 
 
-def agree(works: Sequence[Work], reference: Work, what: str) -> None:
+def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str) -> None:
     """Compute all results once as a warm-up; raise DifferenceError if one differs from `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
     expected = np.array(reference.result())
-    for work in works:
-        work.compute()
-        if work.result is None:
+    for task in tasks:
+        task.compute()
+        if task.result is None:
             continue
-        ours = work.result()
+        ours = task.result()
         n = min(len(ours), len(expected))
         ours, theirs = ours[:n], expected[:n]
         if ours.shape != theirs.shape:
-            raise DifferenceError(f"{what}: {work.who} has the shape {ours.shape}, not {theirs.shape}")
-        if not np.allclose(ours, theirs, rtol=0.0, atol=work.tolerance):
+            raise DifferenceError(f"{what}: {task.label} has the shape {ours.shape}, not {theirs.shape}")
+        if not np.allclose(ours, theirs, rtol=0.0, atol=task.tolerance):
             worst = float(np.abs(ours - theirs).max())
-            raise DifferenceError(f"{what}: {work.who} and {reference.who} differ by {worst:.3g}")
+            raise DifferenceError(f"{what}: {task.label} and {reference.label} differ by {worst:.3g}")
 
 
-def times(
-    works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
+def measure_times(
+    tasks: Sequence[TimedTask], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
     """Return the times (ns) for one configuration, one for each round."""
-    found: dict[str, list[float]] = {work.who: [] for work in works}
-    shuffled, order = list(works), random.Random(0)
+    found: dict[str, list[float]] = {task.label: [] for task in tasks}
+    shuffled, order = list(tasks), random.Random(0)
     gc.disable()
     try:
         for _ in range(rounds):
             order.shuffle(shuffled)
-            for work in shuffled:
-                work.compute()
+            for task in shuffled:
+                task.compute()
                 begin = clock()
-                work.compute()
-                found[work.who].append((clock() - begin) / work.n * 1e9)
+                task.compute()
+                found[task.label].append((clock() - begin) / task.n * 1e9)
     finally:
         gc.enable()
-    return {who: np.array(values) for who, values in found.items()}
+    return {label: np.array(values) for label, values in found.items()}
 
 
-def measure(
+def measure_rows(
     table: Row,
-    works: Sequence[Work],
+    tasks: Sequence[TimedTask],
     rounds: int,
-    baseline: Work | None = None,
+    baseline: TimedTask | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
     """Measure tasks that have already run once, so that their kernels are compiled."""
-    found = times(works, rounds, clock)
-    medians = {who: float(np.median(values)) for who, values in found.items()}
+    found = measure_times(tasks, rounds, clock)
+    medians = {label: float(np.median(values)) for label, values in found.items()}
     return [
         replace(
             table,
-            who=work.who,
-            n=work.n,
-            median_ns=round(medians[work.who], 3),
-            minimum_ns=round(float(found[work.who].min()), 3),
-            ratio=None if baseline is None else round(medians[baseline.who] / medians[work.who], 3),
-            remark=work.remark,
+            label=task.label,
+            n=task.n,
+            median_ns=round(medians[task.label], 3),
+            minimum_ns=round(float(found[task.label].min()), 3),
+            ratio=None if baseline is None else round(medians[baseline.label] / medians[task.label], 3),
+            remark=task.remark,
         )
-        for work in works
+        for task in tasks
     ]
 
 
@@ -131,7 +131,7 @@ class Calls:
     The lines become the body of a loop, so the measured time includes no call of the benchmark itself.
     """
 
-    who: str
+    label: str
     names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
     lines: tuple[str, ...]  # The value of the last line is the result.
     #: Lines that write the result of configuration k into `out[k]`; None writes the value of the last line.
@@ -146,32 +146,34 @@ class Calls:
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 
-    def batch(self, subject: Subject, quantity: str) -> Work:
-        inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
-        out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
-        loop = self.loop()
+    def make_batch_task(self, workload: Workload, quantity: str) -> TimedTask:
+        inputs = [self._reorder(x) for x in workload.inputs(quantity, workload.loop)]
+        out = np.empty((workload.loop, *(self.shape or workload.result_shape(quantity))))
+        loop = self.make_loop()
         run, result = lambda: loop(out, *inputs), lambda: self.read(out)
-        return Work(self.who, subject.loop, run, result, remark=self.remark)
+        return TimedTask(self.label, workload.loop, run, result, remark=self.remark)
 
-    def loop(self) -> Callable[..., None]:
+    def make_loop(self) -> Callable[..., None]:
         """Return a function that loops over a batch; it writes the results to `out`."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
-        return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
+        return _compile_function(
+            self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body
+        )
 
-    def single(self, subject: Subject, quantity: str) -> Work:
+    def make_single_task(self, workload: Workload, quantity: str) -> TimedTask:
         """Return the timed task for single calls; their results are not stored."""
-        inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
+        inputs = [list(self._reorder(x)) for x in workload.inputs(quantity, workload.loop)]
         rows = list(_rows(inputs))
-        repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
+        repeat = _compile_function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
         last = (*self.lines[:-1], f"return {self.lines[-1]}")
-        one = _function(self.names, "q, v, a", "if True:", last)
+        one = _compile_function(self.names, "q, v, a", "if True:", last)
 
         def result() -> FloatArray:
             return self.read(np.stack([self.read_one(one(*row)) for row in rows[:20]]))
 
-        return Work(self.who, len(rows), lambda: repeat(rows), result, TOLERANCE, self.remark)
+        return TimedTask(self.label, len(rows), lambda: repeat(rows), result, TOLERANCE, self.remark)
 
-    def _ordered(self, x: FloatArray) -> FloatArray:
+    def _reorder(self, x: FloatArray) -> FloatArray:
         return x if self.order is None else np.ascontiguousarray(x[:, self.order])
 
 
@@ -180,7 +182,7 @@ def _rows(inputs: Any) -> Any:
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
-def _function(
+def _compile_function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
     """Compile a function: first the line `head`, then the indented lines `body`, which may use `names`."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 
-def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]:
+def compute_poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]:
     """Return a 4 x 4 pose for each configuration."""
     scope: dict[str, Any] = {"__name__": "table"}
     exec(compile(text, form, "exec"), scope)
@@ -37,4 +37,4 @@ def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]
 
 if __name__ == "__main__":
     jobs = json.loads(Path(sys.argv[1]).read_text("utf-8"))
-    Path(sys.argv[2]).write_text(json.dumps([poses(**job) for job in jobs]), "utf-8")
+    Path(sys.argv[2]).write_text(json.dumps([compute_poses(**job) for job in jobs]), "utf-8")

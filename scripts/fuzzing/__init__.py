@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-GOOD = (
+PASSED = (
     "refused",
     "verified",
     "not verified, with a finding that states the reason",
@@ -12,20 +12,20 @@ GOOD = (
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    what: str
+    name: str
     data: bytes
     root_joint: str | None = None
     mimic: bool | None = None
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
-        return f"{self.what}; load(..., {options})"
+        return f"{self.name}; load(..., {options})"
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test; `word` is an element of `GOOD` if the test passed, else it names the failure."""
+    """The outcome of a test. `result` is an element of `PASSED`, or it names the failure."""
 
-    word: str
+    result: str
     details: str = ""

@@ -29,8 +29,8 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 #: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call, and number of these frames that are also computed alone.
-TOGETHER, ALONE = 12, 2
-NAMES = 6
+FRAMES_PER_CALL, SINGLE_FRAMES = 12, 2
+TESTED_NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
 #: Quantities that accept several frames, each with its number of inputs.
@@ -64,33 +64,33 @@ def _evaluate(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
         return Outcome("load refuses a file that check accepts", str(error))
     if errors:
         return Outcome("load accepts a file that check refuses", str(errors[0]))
-    return _computed(robot, findings, warned)
+    return _check_results(robot, findings, warned)
 
 
 def _evaluate_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
-    model = mjcf.compiled(case.data)
+    model = mjcf.compile_model(case.data)
     try:
         robot = urdfkin.load(case.data, mimic=case.mimic)
     except InputError as error:
         known = model is None or error.remedy is not None
         return Outcome("refused" if known else "load refuses a file that MuJoCo accepts", str(error))
-    if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
+    if model is not None and (found := mjcf.find_difference(robot, model, 0)) is not None:
         return Outcome("MuJoCo reads another robot", found)
-    return _computed(robot, robot.findings, warned)
+    return _check_results(robot, robot.findings, warned)
 
 
-def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
+def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
     too_large = "a result is not a finite number"
     if _SIZES & {finding.code for finding in findings}:
         too_large = "too large to compute, with a finding that states the reason"
     try:
-        for what, result in ask(robot, seed=0):
+        for what, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, what)
         # The certificate does not cover DH tables. A table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
-        ask_prepared(robot, seed=0)
+        compare_prepared(robot, seed=0)
     except (urdfkin.VerificationError, urdfkin.TableError, RangeError, MismatchError) as error:
         words = {
             urdfkin.VerificationError: "disagrees with Pinocchio",
@@ -111,21 +111,25 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
     return Outcome("not verified, and no finding states the reason", texts)
 
 
-def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
+def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
     """Yield the name and the result of each checked computation; raise MismatchError if two differ.
 
     Errors about singular representations and about paths without a table are expected.
     """
     generator = np.random.default_rng(seed)
-    inputs = _inputs(robot, seed)
+    inputs = _draw_inputs(robot, seed)
     frames = robot.all_frames
-    if len(frames) > TOGETHER:
-        frames = tuple(frames[i] for i in sorted(generator.choice(len(frames), TOGETHER, replace=False)))
-    alone = [frames[i] for i in sorted({len(frames) - 1, int(generator.integers(len(frames)))})][:ALONE]
-    yield from _names(robot, inputs[0][0], generator)
-    for base in (None, _base(generator, 1.0), _base(generator, FAR)):
+    if len(frames) > FRAMES_PER_CALL:
+        frames = tuple(
+            frames[i] for i in sorted(generator.choice(len(frames), FRAMES_PER_CALL, replace=False))
+        )
+    alone = [frames[i] for i in sorted({len(frames) - 1, int(generator.integers(len(frames)))})][
+        :SINGLE_FRAMES
+    ]
+    yield from _placements_by_name(robot, inputs[0][0], generator)
+    for base in (None, _draw_base(generator, 1.0), _draw_base(generator, FAR)):
         for reference in Reference:
-            yield from _together(robot, frames, alone, reference, base, inputs)
+            yield from _compare_calls(robot, frames, alone, reference, base, inputs)
         for frame in alone:
             for representation in ("ZYZ", "xyz", "quaternion"):
                 try:
@@ -136,24 +140,24 @@ def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
     yield from _tables(robot, alone)
 
 
-def ask_prepared(robot: Robot, seed: int) -> None:
+def compare_prepared(robot: Robot, seed: int) -> None:
     """Compare unchecked results of a prepared frame with checked ones; raise MismatchError if one differs."""
-    inputs = [x[0] for x in _inputs(robot, seed)]
+    inputs = [x[0] for x in _draw_inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
         fast = robot.prepare(frame, reference)
         for name in ("placement", "velocity", "jacobian", "acceleration"):
             ours = getattr(fast, name)(*inputs[: QUANTITIES[name]])
-            theirs = _result(robot, name, inputs, frame, reference)
-            _same(f"{name} of {frame!r} prepared and not", ours, theirs)
+            theirs = _compute(robot, name, inputs, frame, reference)
+            _check_equal(f"{name} of {frame!r} prepared and not", ours, theirs)
 
 
-def _inputs(robot: Robot, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _draw_inputs(robot: Robot, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     v, a = np.random.default_rng([seed, 1]).normal(size=(2, 2, robot.nv))
     return robot.sample(2, seed), v, a
 
 
-def _base(generator: np.random.Generator, size: float) -> BaseMotion:
+def _draw_base(generator: np.random.Generator, size: float) -> BaseMotion:
     R = np.linalg.qr(generator.normal(size=(3, 3)))[0]
     T = np.eye(4)
     T[:3, :3] = R * np.linalg.det(R)
@@ -161,7 +165,7 @@ def _base(generator: np.random.Generator, size: float) -> BaseMotion:
     return BaseMotion(T, *generator.normal(size=(2, 6)))
 
 
-def _result(
+def _compute(
     robot: Robot,
     name: str,
     inputs: Sequence[FloatArray],
@@ -174,7 +178,7 @@ def _result(
     return result
 
 
-def _together(
+def _compare_calls(
     robot: Robot,
     frames: tuple[str, ...],
     alone: list[str],
@@ -188,27 +192,31 @@ def _together(
     for name in QUANTITIES:
         if name == "placement" and reference is not Reference.LOCAL_WORLD_ALIGNED:
             continue
-        every = _result(robot, name, inputs, frames, reference, base)
+        every = _compute(robot, name, inputs, frames, reference, base)
         yield name, every
         for frame in alone:
-            batch = _result(robot, name, inputs, frame, reference, base)
-            one = _result(robot, name, single, frame, reference, base)
-            _same(f"{name} of several frames and of {frame!r}", every[:, frames.index(frame)], batch)
-            _same(f"{name} of {frame!r} in a batch and alone", batch[1], one)
+            batch = _compute(robot, name, inputs, frame, reference, base)
+            one = _compute(robot, name, single, frame, reference, base)
+            _check_equal(f"{name} of several frames and of {frame!r}", every[:, frames.index(frame)], batch)
+            _check_equal(f"{name} of {frame!r} in a batch and alone", batch[1], one)
     for frame in alone:
         words = (frame, reference)
         rate = robot.jacobian_rate(q, v, *words, base=base)
-        _same(f"jacobian_rate of {frame!r}", rate[0], robot.jacobian_rate(q[0], v[0], *words, base=base))
+        _check_equal(
+            f"jacobian_rate of {frame!r}", rate[0], robot.jacobian_rate(q[0], v[0], *words, base=base)
+        )
         yield "jacobian_rate", rate
         yield "acceleration_breakdown", robot.acceleration_breakdown(q, v, a, *words, base=base).total
 
 
-def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
+def _placements_by_name(
+    robot: Robot, q: FloatArray, generator: np.random.Generator
+) -> Iterator[tuple[str, FloatArray]]:
     """Yield placements of frames by name; urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
-    for i in generator.permutation(len(asked))[:NAMES]:
+    for i in generator.permutation(len(asked))[:TESTED_NAMES]:
         try:
             yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
         except UnknownNameError:  # For example, `joint:x` is unknown if x is only a link.
@@ -230,6 +238,6 @@ def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]
             yield f"{convention} table", table.placement(robot.select(table, robot.neutral()))
 
 
-def _same(what: str, x: FloatArray, y: FloatArray) -> None:
+def _check_equal(what: str, x: FloatArray, y: FloatArray) -> None:
     if x.tobytes() != y.tobytes() and not np.array_equal(x, y, equal_nan=True):
         raise MismatchError(f"{what}: off by {np.abs(x - y).max():.3g}")

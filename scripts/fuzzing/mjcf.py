@@ -10,25 +10,25 @@ import mujoco
 import numpy as np
 
 from scripts.fuzzing import Case
-from scripts.fuzzing.robots import direction, tame_length
+from scripts.fuzzing.robots import draw_direction, usual_length
 from urdfkin.model.tree import JointKind, LinkFrame
 from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
 #: Allowed relative difference from MuJoCo's placements, and between the sides of an equality constraint.
-_APART = 1e-12
+_TOLERANCE = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 
-def robot(seed: int, family: str, number: int) -> Case:
+def make_model(seed: int, family: str, number: int) -> Case:
     rng = random.Random(f"{seed}:{family}:{number}")
-    return Case(f"{family} {number}", _File(rng, family).text().encode())
+    return Case(f"{family} {number}", _RandomModel(rng, family).text().encode())
 
 
-class _File:
+class _RandomModel:
     def __init__(self, rng: random.Random, family: str) -> None:
         self.rng, self.family = rng, family
         self.bodies, self.sites = 0, 0
@@ -56,7 +56,7 @@ class _File:
         if self.family != "mjcf-classes":
             return ""
         sites = [f'<site pos="{self.vector()}"/>' * (self.rng.random() < 0.5) for _ in _CLASSES]
-        outer, inner, other = (f"<joint {' '.join(self.joint_words(0.3))}/>{site}" for site in sites)
+        outer, inner, other = (f"<joint {' '.join(self.joint_attributes(0.3))}/>{site}" for site in sites)
         outer = f'<default class="outer">{outer}<default class="inner">{inner}</default></default>'
         return f'<default>{outer}<default class="other">{other}</default></default>'
 
@@ -80,28 +80,28 @@ class _File:
             parts.append(f'<inertial pos="{self.vector()}" mass="1" diaginertia="{moments}"/>')
         for _ in range(rng.randint(0, 2)):
             place = f'pos="{self.vector()}" {self.orientation()}' if rng.random() < 0.7 else ""
-            parts.append(f'<site name="site{self.sites}"{self.of_class()} {place}/>')
+            parts.append(f'<site name="site{self.sites}"{self.class_attribute()} {place}/>')
             self.sites += 1
         while depth < 4 and rng.random() < 0.45:
             parts.append(self.body(depth + 1))
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
-    def of_class(self) -> str:
+    def class_attribute(self) -> str:
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
 
     def joint(self) -> str:
         name = f"joint{len(self.joints)}"
         self.joints.append(name)
-        return f'<joint name="{name}"{self.of_class()} {" ".join(self.joint_words(0.7))}/>'
+        return f'<joint name="{name}"{self.class_attribute()} {" ".join(self.joint_attributes(0.7))}/>'
 
-    def joint_words(self, share: float) -> list[str]:
+    def joint_attributes(self, share: float) -> list[str]:
         rng = self.rng
         lower, upper = sorted((rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0)))
         large = rng.random() < 0.2
         words = (
             f'type="{rng.choice(("hinge", "hinge", "slide"))}"',
-            f'axis="{" ".join(map(repr, direction(rng)))}"',
+            f'axis="{" ".join(map(repr, draw_direction(rng)))}"',
             f'pos="{self.vector()}"',
             f'ref="{rng.uniform(-2.0, 2.0) * (1e4 if large else 1.0)!r}"',
             f'range="{lower!r} {upper + 0.1!r}" limited="true"',
@@ -115,13 +115,13 @@ class _File:
             "",
             f'quat="{" ".join(repr(rng.gauss(0.0, 1.0)) for _ in range(4))}"',
             f'euler="{" ".join(repr(rng.uniform(-angle, angle)) for _ in range(3))}"',
-            f'axisangle="{" ".join(map(repr, direction(rng)))} {rng.uniform(-angle, angle)!r}"',
+            f'axisangle="{" ".join(map(repr, draw_direction(rng)))} {rng.uniform(-angle, angle)!r}"',
             f'xyaxes="1 {rng.random()!r} 0 0 1 {rng.random()!r}"',
         )
         return rng.choice(notations)
 
     def vector(self) -> str:
-        return " ".join(repr(tame_length(self.rng)) for _ in range(3))
+        return " ".join(repr(usual_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
         rng, made = self.rng, []
@@ -141,14 +141,14 @@ class _File:
         return f"<equality>{''.join(made)}</equality>"
 
 
-def compiled(data: bytes) -> mujoco.MjModel | None:
+def compile_model(data: bytes) -> mujoco.MjModel | None:
     try:
         return mujoco.MjModel.from_xml_string(data.decode())
     except ValueError:
         return None
 
 
-def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
+def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
     """Return a message about the first difference from MuJoCo, or None if there is no difference.
 
     The placements of bodies and sites are compared, and the equality constraints are checked.
@@ -173,11 +173,11 @@ def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
                 one = getattr(data, kind)(i)
                 T = robot.placement(q, LinkFrame.of(one.name))
                 off = max(np.abs(T[:3, 3] - one.xpos).max(), np.abs(T[:3, :3].ravel() - one.xmat).max())
-                if off > _APART * large:
+                if off > _TOLERANCE * large:
                     return f"{one.name} is off by {off:.3g}"
         for row in np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)):
             i = int(data.efc_id[row])
             name = model.equality(i).name
-            if name not in warned and abs(data.efc_pos[row]) > 1e3 * _APART * large:
+            if name not in warned and abs(data.efc_pos[row]) > 1e3 * _TOLERANCE * large:
                 return f"{name} is off by {data.efc_pos[row]:.3g}"
     return None

@@ -49,19 +49,19 @@ _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
 
 
-def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
+def make_mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
     data, done = path.read_bytes(), [path.stem]
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         how = rng.choice(rng.choice(FAMILIES))
-        change = _of_bytes if how in _BYTES else _of_tokens if how in _TOKENS else _of_elements
+        change = _change_bytes if how in _BYTES else _change_tokens if how in _TOKENS else _change_tree
         data = change(rng, how, data)
         done.append(how)
     return Case(" ".join(done), data)
 
 
-def _of_bytes(rng: random.Random, how: str, data: bytes) -> bytes:
+def _change_bytes(rng: random.Random, how: str, data: bytes) -> bytes:
     at = rng.randrange(len(data) + 1)
     match how:
         case "flip_a_bit":
@@ -81,7 +81,7 @@ def _of_bytes(rng: random.Random, how: str, data: bytes) -> bytes:
     return data.decode("utf-8", "replace").encode(encoding, "replace")
 
 
-def _of_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
+def _change_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
     if how == "prologue":
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
@@ -106,7 +106,7 @@ def _of_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
     return data[: first.start(group)] + rng.choice(pieces[how]) + data[first.end(group) :]
 
 
-def _of_elements(rng: random.Random, how: str, data: bytes) -> bytes:
+def _change_tree(rng: random.Random, how: str, data: bytes) -> bytes:
     try:
         root = ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError):

@@ -13,15 +13,15 @@ from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
 #: Robots of the family "everything" have several random kinds of unusual content.
-ODDITIES = ("names", "prefixes", "versions", "followers", "lengths", "angles", "axes", "limits", "roots")
+ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
 #: Names that resemble internal names of urdfkin or Pinocchio.
-LIKE_OURS = (
+INTERNAL_NAMES = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
 )  # fmt: skip
-STRANGE = (
+UNUSUAL_NAMES = (
     "-", "--", " ", " a", "a ", "\u00a0", "\u200b", "_", ".", "/", "../a", "a/b", "ä", "a\u0308", "关节",
     "\U0001f916", "\u202eba", "<a>", "&amp;", "'", '"', "#", "%s", "{0}", "$a", "=1+1", "null", "None", "nan",
     "0", "-1", "A", "joint", "link", "world", "a,b", "a;b", "[a]", "\\", "x" * 300, "y" * 9_999,
@@ -51,7 +51,7 @@ PREFIXES = ("drake", "gazebo", "link", "joint", "x", "mujoco", "ns0", "xml", "_"
 _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
-def written(rng: random.Random, x: float) -> str:
+def format_number(rng: random.Random, x: float) -> str:
     """Return a number, sometimes slightly changed, as text in a random notation."""
     plain = repr(x)
     if rng.random() < 0.85:
@@ -59,11 +59,11 @@ def written(rng: random.Random, x: float) -> str:
     return rng.choice((f"+{plain}" if x >= 0.0 else plain, f"{x:.17g}", f"{x:.40e}", f"{x:.3g}", f"{x:E}"))
 
 
-def vector(rng: random.Random, numbers: list[float]) -> str:
-    return " ".join(written(rng, x) for x in numbers)
+def format_vector(rng: random.Random, numbers: list[float]) -> str:
+    return " ".join(format_number(rng, x) for x in numbers)
 
 
-def tame_length(rng: random.Random) -> float:
+def usual_length(rng: random.Random) -> float:
     return rng.choice((0.0, 0.0, round(rng.uniform(-1.0, 1.0), 3), rng.uniform(-1.0, 1.0)))
 
 
@@ -77,7 +77,7 @@ def odd_length(rng: random.Random) -> float:
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)
 
 
-def tame_angle(rng: random.Random) -> float:
+def usual_angle(rng: random.Random) -> float:
     return rng.choice((*_TURNS[:4], rng.uniform(-math.pi, math.pi)))
 
 
@@ -88,7 +88,7 @@ def odd_angle(rng: random.Random) -> float:
     return rng.choice((near, large, 10.0 ** rng.uniform(-320, 0), rng.uniform(-9.0, 9.0), 90.0, 180.0))
 
 
-def direction(rng: random.Random) -> list[float]:
+def draw_direction(rng: random.Random) -> list[float]:
     if rng.random() < 0.5:
         axis = [0.0, 0.0, 0.0]
         axis[rng.randrange(3)] = rng.choice((1.0, -1.0))
@@ -99,7 +99,7 @@ def direction(rng: random.Random) -> list[float]:
 
 def odd_axis(rng: random.Random) -> list[float]:
     """Return an axis of unusual length, or an axis that is nearly along a coordinate axis."""
-    axis = direction(rng)
+    axis = draw_direction(rng)
     if rng.random() < 0.5:
         tilt = 10.0 ** rng.uniform(-20, -3)
         axis = [x + tilt * rng.gauss(0.0, 1.0) for x in axis]
@@ -147,29 +147,31 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 def odd_limit(rng: random.Random) -> str:
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
-    return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))
+    return (
+        rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, format_number(rng, rng.random())))
+    )
 
 
-def robot(seed: int, family: str, number: int) -> Case:
+def make_robot(seed: int, family: str, number: int) -> Case:
     rng = random.Random(f"{seed}:{family}:{number}")
     if family == "everything":
         strange: Collection[str] = {name for name in ODDITIES if rng.random() < 0.4}
     else:
         strange = {family}
     root_joint = rng.choice((None, "floating", "planar")) if "roots" in strange else None
-    mimic = rng.choice((None, None, None, True, False)) if "followers" in strange else None
+    mimic = rng.choice((None, None, None, True, False)) if "mimic" in strange else None
     what = f"{family} {number}: {' '.join(sorted(strange)) or 'plain'}"
-    return Case(what, _Robot(rng, strange).text().encode(), root_joint, mimic)
+    return Case(what, _RandomRobot(rng, strange).text().encode(), root_joint, mimic)
 
 
-class _Robot:
+class _RandomRobot:
     def __init__(self, rng: random.Random, strange: Collection[str]) -> None:
         self.rng, self.strange = rng, strange
         self.version = rng.choice(("", "1.0", "1.1", "1.1", "1.2", "1.2")) if "versions" in strange else ""
         count = rng.randint(1, 8) if rng.random() < 0.97 else 0
         self.links, self.joints = self.names("l", count + 1), self.names("j", count)
         self.kinds = [rng.choices(KINDS, _WEIGHTS)[0] for _ in range(count)]
-        if "followers" in strange and count > 1:
+        if "mimic" in strange and count > 1:
             self.kinds[0] = "revolute"
         declared = rng.random() < 0.5
         self.prefix = rng.choice(PREFIXES)
@@ -182,7 +184,7 @@ class _Robot:
     def text(self) -> str:
         rng, version = self.rng, self.version
         numbers = f' version="{version}"' if version else ""
-        name = quoteattr(rng.choice((*LIKE_OURS, *STRANGE)) if "names" in self.strange else "r")
+        name = quoteattr(rng.choice((*INTERNAL_NAMES, *UNUSUAL_NAMES)) if "names" in self.strange else "r")
         parts = [f"<link name={quoteattr(link)}>{self.foreign()}</link>" for link in self.links]
         parts += [self.joint(i) for i in range(len(self.joints))]
         if rng.random() < 0.3:
@@ -199,7 +201,9 @@ class _Robot:
         names = dict[str, None]()
         while len(names) < count:
             mixed = "".join(self.rng.choices(_PARTS, k=self.rng.randint(1, 4)))
-            names[self.rng.choice((self.rng.choice(LIKE_OURS), self.rng.choice(STRANGE), mixed))] = None
+            names[
+                self.rng.choice((self.rng.choice(INTERNAL_NAMES), self.rng.choice(UNUSUAL_NAMES), mixed))
+            ] = None
         return list(names)
 
     def joint(self, i: int) -> str:
@@ -220,12 +224,12 @@ class _Robot:
 
     def origin(self) -> str:
         rng = self.rng
-        length = odd_length if "lengths" in self.strange and rng.random() < 0.5 else tame_length
-        angle = odd_angle if "angles" in self.strange and rng.random() < 0.5 else tame_angle
-        xyz = f' xyz="{vector(rng, [length(rng) for _ in range(3)])}"'
-        rpy = f' rpy="{vector(rng, [angle(rng) for _ in range(3)])}"'
+        length = odd_length if "lengths" in self.strange and rng.random() < 0.5 else usual_length
+        angle = odd_angle if "angles" in self.strange and rng.random() < 0.5 else usual_angle
+        xyz = f' xyz="{format_vector(rng, [length(rng) for _ in range(3)])}"'
+        rpy = f' rpy="{format_vector(rng, [angle(rng) for _ in range(3)])}"'
         if "versions" in self.strange and rng.random() < 0.5:
-            quaternion = f' quat_xyzw="{vector(rng, odd_quaternion(rng))}"'
+            quaternion = f' quat_xyzw="{format_vector(rng, odd_quaternion(rng))}"'
             rpy = quaternion if rng.random() < 0.95 else rpy + quaternion
         return rng.choice((f"<origin{xyz}{rpy}/>",) * 4 + (f"<origin{rpy}/>", f"<origin{xyz}/>", ""))
 
@@ -236,8 +240,8 @@ class _Robot:
         if kind in ("fixed", "floating"):
             return ""
         odd_one = "axes" in self.strange and self.rng.random() < 0.8
-        numbers = odd_axis(self.rng) if odd_one else direction(self.rng)
-        return f'<axis xyz="{vector(self.rng, numbers)}"/>' if self.rng.random() < 0.9 else ""
+        numbers = odd_axis(self.rng) if odd_one else draw_direction(self.rng)
+        return f'<axis xyz="{format_vector(self.rng, numbers)}"/>' if self.rng.random() < 0.9 else ""
 
     def limit(self, kind: str) -> str:
         rng = self.rng
@@ -250,12 +254,12 @@ class _Robot:
         if "limits" in self.strange:
             lower, upper = odd_range(rng, kind == "revolute")
             effort = rng.choice((0.0, 1.0, 1e300, 5e-324, abs(odd_length(rng))))
-        words = [f'lower="{written(rng, lower)}"', f'upper="{written(rng, upper)}"']
+        words = [f'lower="{format_number(rng, lower)}"', f'upper="{format_number(rng, upper)}"']
         if kind == "continuous" or (kind not in _ONE_COORDINATE and rng.random() < 0.5):
             words = []
         elif "limits" in self.strange and rng.random() < 0.2:
             words.pop(rng.randrange(2))
-        words += [f'{word}="{written(rng, effort)}"' for word in ("effort", "velocity")]
+        words += [f'{word}="{format_number(rng, effort)}"' for word in ("effort", "velocity")]
         if "versions" in self.strange:
             further = [name for name in FURTHER_LIMITS if rng.random() < 0.3]
             words += [f'{name}="{odd_limit(rng)}"' for name in further]
@@ -263,7 +267,7 @@ class _Robot:
 
     def mimic(self, i: int) -> str:
         rng = self.rng
-        if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
+        if "mimic" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
         # A mimic joint mimics only a joint with a lower number, so there is no cycle.
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
@@ -271,9 +275,9 @@ class _Robot:
             return ""
         words = [f"joint={quoteattr(self.joints[rng.choice(independent_joints)])}"]
         if rng.random() < 0.9:
-            words.append(f'multiplier="{written(rng, odd_factor(rng))}"')
+            words.append(f'multiplier="{format_number(rng, odd_factor(rng))}"')
         if rng.random() < 0.6:
-            words.append(f'offset="{written(rng, rng.choice((odd_angle, tame_angle))(rng))}"')
+            words.append(f'offset="{format_number(rng, rng.choice((odd_angle, usual_angle))(rng))}"')
         return f"<mimic {' '.join(words)}/>"
 
     def foreign(self) -> str:

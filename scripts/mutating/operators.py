@@ -27,29 +27,29 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant, which puts a new value into the list or syntax node `home`.
+    """One mutant, which puts a new value into the list or syntax node `container`.
 
-    `place` is an index of the list, or the name of a field of the node.
+    `key` is an index of the list, or the name of a field of the node.
     """
 
-    shown: ast.AST  # The description of the mutant quotes the text of this node.
-    home: Any
-    place: int | str
+    node: ast.AST  # The description of the mutant quotes the text of this node.
+    container: Any
+    key: int | str
     value: Any
 
     @property
     def line(self) -> int:
-        return getattr(self.shown, "lineno", 0)
+        return getattr(self.node, "lineno", 0)
 
     @property
-    def what(self) -> str:
-        before = _short(self.shown)
-        with self.made() as old:
-            after = _short(self.shown if self.shown is not old else self.value)
+    def text(self) -> str:
+        before = _describe(self.node)
+        with self.applied() as old:
+            after = _describe(self.node if self.node is not old else self.value)
         return f"{before}  ->  {after}"
 
     @contextmanager
-    def made(self) -> Iterator[Any]:
+    def applied(self) -> Iterator[Any]:
         """Change the tree in place until the end of the `with` block; yield the previous value."""
         old = self.put(self.value)
         try:
@@ -58,22 +58,26 @@ class Change:
             self.put(old)
 
     def put(self, value: Any) -> Any:
-        if isinstance(self.place, int):
-            old, self.home[self.place] = self.home[self.place], value
+        if isinstance(self.key, int):
+            old, self.container[self.key] = self.container[self.key], value
         else:
-            old = getattr(self.home, self.place)
-            setattr(self.home, self.place, value)
+            old = getattr(self.container, self.key)
+            setattr(self.container, self.key, value)
         return old
 
 
-def changes_of(tree: ast.Module) -> list[Change]:
+def list_changes(tree: ast.Module) -> list[Change]:
     """Return all mutants of a file in a fixed order; applying a mutant changes the given tree."""
-    return [change for node in _code(tree) for change in (*_of_expression(node), *_of_statement(node))]
+    return [
+        change
+        for node in _executed_nodes(tree)
+        for change in (*_expression_changes(node), *_statement_changes(node))
+    ]
 
 
-def mutated(source: str, number: int) -> ast.Module:
+def apply_change(source: str, number: int) -> ast.Module:
     tree = ast.parse(source)
-    change = changes_of(tree)[number]
+    change = list_changes(tree)[number]
     change.put(change.value)
     return ast.fix_missing_locations(tree)
 
@@ -89,7 +93,7 @@ def function_at(tree: ast.Module, line: int) -> str:
     return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
-def replaced(source: str, function: str, before: str, after: str) -> ast.Module:
+def replace_code(source: str, function: str, before: str, after: str) -> ast.Module:
     """Return a file's tree in which one piece of the code of a function is replaced.
 
     `function` names a function, a class or a method, such as `Tally.percentile`; "" is the whole file.
@@ -97,7 +101,7 @@ def replaced(source: str, function: str, before: str, after: str) -> ast.Module:
     do not matter. Raise ValueError unless `before` occurs exactly once in the function.
     """
     tree = ast.parse(source)
-    wanted = [[ast.unparse(node) for node in nodes] for nodes in _readings(before)]
+    wanted = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
     found = [
         (node, field, at, len(texts))
         for node in ast.walk(_definition(tree, function))
@@ -112,9 +116,9 @@ def replaced(source: str, function: str, before: str, after: str) -> ast.Module:
     (node, field, at, size), *_ = found
     old = getattr(node, field)
     if isinstance(old, list):
-        old[at : at + size] = _parsed(after, type(old[at]))
+        old[at : at + size] = _parse_as(after, type(old[at]))
     else:
-        setattr(node, field, _parsed(after, type(old))[0])
+        setattr(node, field, _parse_as(after, type(old))[0])
     return ast.fix_missing_locations(tree)
 
 
@@ -127,19 +131,19 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
     return node
 
 
-def _readings(code: str) -> list[list[ast.AST]]:
+def _parse_alternatives(code: str) -> list[list[ast.AST]]:
     """Parse code as an expression. If the code is no expression, parse it as statements and as arguments."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
             with suppress(SyntaxError):
-                readings.append(_parsed(code, kind))
+                readings.append(_parse_as(code, kind))
         if any(readings):
             return readings
     raise ValueError(f"not code: {code}")
 
 
-def _parsed(code: str, kind: type) -> list[ast.AST]:
+def _parse_as(code: str, kind: type) -> list[ast.AST]:
     """Parse code into nodes of one kind: expressions, statements or keyword arguments."""
     if issubclass(kind, ast.stmt):
         return [*ast.parse(code).body]
@@ -149,43 +153,43 @@ def _parsed(code: str, kind: type) -> list[ast.AST]:
     return [*call.keywords]
 
 
-def _code(node: ast.AST) -> Iterator[ast.AST]:
+def _executed_nodes(node: ast.AST) -> Iterator[ast.AST]:
     """Yield the nodes of a syntax tree that are executed, without types, texts and decorators."""
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):
             continue
         for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST) and not _for_types(child):
-                yield from _code(child)
+            if isinstance(child, ast.AST) and not _is_for_types(child):
+                yield from _executed_nodes(child)
 
 
-def _for_types(node: ast.AST) -> bool:
+def _is_for_types(node: ast.AST) -> bool:
     if isinstance(node, ast.If):
         return ast.unparse(node.test) == "TYPE_CHECKING"
     return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
 
 
-def _of_expression(node: ast.AST) -> Iterator[Change]:
+def _expression_changes(node: ast.AST) -> Iterator[Change]:
     match node:
         case ast.Compare():
             for i, op in enumerate(node.ops):
                 yield Change(node, node.ops, i, _COMPARISONS[type(op)]())
         case ast.BoolOp():
             yield Change(node, node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())
-        case ast.BinOp() | ast.AugAssign() if type(node.op) in _OPERATIONS and not _of_text(node):
+        case ast.BinOp() | ast.AugAssign() if type(node.op) in _OPERATIONS and not _concerns_text(node):
             yield Change(node, node, "op", _OPERATIONS[type(node.op)]())
         case ast.UnaryOp(op=ast.USub()):
             yield Change(node, node, "op", ast.UAdd())
         case ast.UnaryOp(op=ast.Not()):
             yield Change(node, node, "operand", ast.UnaryOp(ast.Not(), node.operand))
         case ast.Constant(value=bool() | int() | float() as value):
-            yield Change(node, node, "value", _other(value))
+            yield Change(node, node, "value", _other_value(value))
         case ast.Name(id=name) if name in _NAMES:
             yield Change(node, node, "id", _NAMES[name])
 
 
-def _of_statement(node: ast.AST) -> Iterator[Change]:
+def _statement_changes(node: ast.AST) -> Iterator[Change]:
     match node:
         case ast.If(test=test) | ast.IfExp(test=test) if isinstance(
             test, ast.Name | ast.Attribute | ast.Call
@@ -200,19 +204,19 @@ def _of_statement(node: ast.AST) -> Iterator[Change]:
                 yield Change(statement, statements, i, other())
 
 
-def _short(node: ast.AST) -> str:
+def _describe(node: ast.AST) -> str:
     if isinstance(node, ast.If):
         return f"if {ast.unparse(node.test)}"
     return " ".join(ast.unparse(ast.fix_missing_locations(node)).split())[:90]
 
 
-def _other(value: bool | int | float) -> bool | int | float:
+def _other_value(value: bool | int | float) -> bool | int | float:
     if isinstance(value, bool):
         return not value
     return value + 1 if isinstance(value, int) else value * 1.5 + 0.0 if value else 1.0
 
 
-def _of_text(node: ast.BinOp | ast.AugAssign) -> bool:
+def _concerns_text(node: ast.BinOp | ast.AugAssign) -> bool:
     """Return whether an operand is written as a string or as None, as in `"a" + b` or `int | None`."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(

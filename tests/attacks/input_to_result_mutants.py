@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 import urdfkin
-from scripts.mutating.operators import changes_of, mutated
+from scripts.mutating.operators import apply_change, list_changes
 from tests.reading import tree_of
 from tests.urdfs import joint, limit, mimic, robot
 from urdfkin import BaseMotion
@@ -295,7 +295,7 @@ def truth() -> dict[str, FloatArray]:
 
 def mutants_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
     """Return mutants as (module, number): all mutants of some modules, or a sample."""
-    places = [(name, i) for name in names for i in range(len(changes_of(ast.parse(source_of(name)))))]
+    places = [(name, i) for name in names for i in range(len(list_changes(ast.parse(source_of(name)))))]
     return places if sample is None else random.Random(seed).sample(places, min(sample, len(places)))
 
 
@@ -308,9 +308,9 @@ def main() -> None:
     asked = arguments.parse_args()
     right = truth()
     for name, number in mutants_of(asked.modules or MODULES, asked.sample, asked.seed):
-        change = changes_of(ast.parse(source_of(name)))[number]
-        answer = attempt(name, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
-        row = {"mutant": f"{name}:{number}", "line": change.line, "what": change.what, "outcome": answer}
+        change = list_changes(ast.parse(source_of(name)))[number]
+        answer = attempt(name, lambda source, number=number: apply_change(source, number), right)  # type: ignore[misc]
+        row = {"mutant": f"{name}:{number}", "line": change.line, "what": change.text, "outcome": answer}
         print(json.dumps(row), flush=True)
 
 

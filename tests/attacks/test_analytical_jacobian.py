@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from scripts.mutating.operators import changes_of, function_at, mutated
+from scripts.mutating.operators import apply_change, function_at, list_changes
 from tests.attacks.input_to_result_mutants import make
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics import bodies as module
@@ -177,9 +177,9 @@ OTHER_NAMES = {
 def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Module]]:
     """Yield every module with one changed node in a called function, and a description of the change."""
     right = ast.parse(source)
-    for number, change in enumerate(changes_of(right)):
+    for number, change in enumerate(list_changes(right)):
         if function_at(right, change.line) in called:
-            yield f"{change.line}: {change.what}", mutated(source, number)
+            yield f"{change.line}: {change.text}", apply_change(source, number)
     for number, node in enumerate(ast.walk(right)):
         field = "attr" if isinstance(node, ast.Attribute) else "id"
         name = getattr(node, field, "")

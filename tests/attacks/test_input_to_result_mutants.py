@@ -2,7 +2,7 @@
 
 import pytest
 
-from scripts.mutating.operators import mutated, replaced
+from scripts.mutating.operators import apply_change, replace_code
 from tests.attacks.input_to_result_mutants import MODULES, attempt, mutants_of, source_of, truth
 from urdfkin.model.tree import FloatArray
 
@@ -111,7 +111,7 @@ def right() -> dict[str, FloatArray]:
 def test_the_code_of_each_listed_mutant_occurs_once_in_its_function() -> None:
     for function, before, after in CHANGES:
         module, name = _split(function)
-        replaced(source_of(module), name, before, after)
+        replace_code(source_of(module), name, before, after)
 
 
 @pytest.mark.long
@@ -120,7 +120,7 @@ def test_each_listed_mutant_between_input_and_result_is_detected(
     right: dict[str, FloatArray], function: str, before: str, after: str
 ) -> None:
     module, name = _split(function)
-    assert attempt(module, lambda source: replaced(source, name, before, after), right) == "caught"
+    assert attempt(module, lambda source: replace_code(source, name, before, after), right) == "caught"
 
 
 @pytest.mark.long
@@ -130,7 +130,7 @@ def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
 ) -> None:
     # python -m tests.attacks.input_to_result_mutants runs all mutants
     found = {
-        (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
+        (module, number): attempt(module, lambda source, number=number: apply_change(source, number), right)  # type: ignore[misc]
         for module, number in mutants_of(MODULES, 40, seed)
     }
     assert [mutant for mutant, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from scripts.fuzzing.robots import LIKE_OURS as POOL
+from scripts.fuzzing.robots import INTERNAL_NAMES as POOL
 from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as urdf
 from urdfkin import BaseMotion

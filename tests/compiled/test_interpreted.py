@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from scripts.check_bits import WAYS, Subject, differing_interpreted, same
+from scripts.check_bits import MODES, RobotInputs, find_interpreted_differences, have_equal_bits
 from tests.cli.running import imported, process, python
 from urdfkin.compiled import preload
 from urdfkin.compiled.preload import use_only
@@ -34,7 +34,7 @@ NAMES = [pytest.param(name, marks=() if name in _FEW else pytest.mark.slow) for 
 
 def in_both_ways(compute: Callable[[], FloatArray]) -> list[FloatArray]:
     found = []
-    for way in WAYS:
+    for way in MODES:
         with use_only(way):
             found.append(compute())
     return found
@@ -42,7 +42,7 @@ def in_both_ways(compute: Callable[[], FloatArray]) -> list[FloatArray]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_quantity_of_every_robot_is_bitwise_equal_to_the_kernels_result(name: str) -> None:
-    assert list(differing_interpreted(Subject.of(name))) == []
+    assert list(find_interpreted_differences(RobotInputs.load(name))) == []
 
 
 @pytest.mark.parametrize("root_joint", [None, "floating", "planar"])
@@ -53,8 +53,8 @@ def test_results_with_a_moving_base_a_free_root_and_an_imu_are_bitwise_equal(roo
     base = BaseMotion(velocity=generator.standard_normal(6), acceleration=generator.standard_normal(6))
     for reference in ("local", "world", "local_world_aligned"):
         results = in_both_ways(lambda r=reference: robot.acceleration(q, v, a, "tool0", r, base=base))  # type: ignore[misc]
-        assert same(*results)
-    assert same(*in_both_ways(lambda: robot.imu(q, v, a, "tool0", base=base)))
+        assert have_equal_bits(*results)
+    assert have_equal_bits(*in_both_ways(lambda: robot.imu(q, v, a, "tool0", base=base)))
 
 
 def test_the_sine_is_bitwise_equal_to_the_kernels_for_angles_of_every_size() -> None:
@@ -62,7 +62,7 @@ def test_the_sine_is_bitwise_equal_to_the_kernels_for_angles_of_every_size() -> 
     generator = np.random.default_rng(0)
     angles = generator.standard_normal((200, 2)) * 10.0 ** generator.uniform(-9.0, 9.0, (200, 2))
     angles[:20] = np.pi / 4 * np.arange(-20, 20).reshape(20, 2)
-    assert same(*in_both_ways(lambda: robot.placement(angles, "tip")))
+    assert have_equal_bits(*in_both_ways(lambda: robot.placement(angles, "tip")))
 
 
 def test_the_sine_of_a_number_that_is_not_finite_is_nan() -> None:
@@ -79,7 +79,7 @@ def test_a_fused_product_is_rounded_once_and_overflows_without_an_error() -> Non
 
 def test_invalid_numbers_raise_the_same_errors_with_and_without_kernels() -> None:
     robot = urdfkin.load("planar_two_link", verify=False)
-    for way in WAYS:
+    for way in MODES:
         with use_only(way):
             with pytest.raises(urdfkin.InputError):
                 robot.placement([math.nan, 0.0])
@@ -90,7 +90,7 @@ def test_invalid_numbers_raise_the_same_errors_with_and_without_kernels() -> Non
 
 def test_a_certificate_does_not_depend_on_the_use_of_kernels() -> None:
     certificates = []
-    for way in WAYS:
+    for way in MODES:
         with use_only(way):
             robot = urdfkin.load("tiago")  # it has mimic joints
             robot.jacobian(robot.sample(3), robot.link_names[-3:])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scripts.check_forms import RUN, Job, Missing
+from scripts.check_forms import RUN, Job, MissingProgramError
 from tests.comparison.pairs import with_joint
 from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.oracle import TreeOracle
@@ -53,7 +53,7 @@ def check(
     theirs = TreeOracle(tree).placement(q, "tip", "l0")
     try:
         (found,) = RUN[form]([Job(table, q)], where)
-    except Missing as error:
+    except MissingProgramError as error:
         pytest.skip(f"{error} is missing")
     assert found.shape == theirs.shape
     assert np.abs(found - theirs).max() <= 300 * EPS * (1 + table.span)

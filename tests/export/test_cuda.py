@@ -21,7 +21,7 @@ from urdfkin.export.check import check
 
 #: Folder with a `cuda_runtime.h` for the processor
 _SHIM = Path(__file__).parent
-_COMPILER = benchmark_gpu.nvcc()
+_COMPILER = benchmark_gpu.find_nvcc()
 _NVCC = pytest.mark.skipif(_COMPILER is None, reason="no nvcc; `make nvcc` installs it")
 
 
@@ -155,28 +155,28 @@ def test_the_benchmarks_program_prints_a_time_of_each_quantity_precision_and_bat
     written = code(urdfkin.load("planar_two_link"), quantities=("jacobian", "acceleration"))
     file(written, "cuda", tmp_path)
     program = tmp_path / "measure.cpp"
-    text = benchmark_gpu.program(written)
+    text = benchmark_gpu.make_program(written)
     assert "@" not in text
     program.write_text(text.replace("(1) << 28", "(1) << 16"), "utf-8")
     lines = ran(program, "-fsanitize=address,undefined", f"-I{tmp_path}").splitlines()
-    measured = list(benchmark_gpu.rows(written, lines))
+    measured = list(benchmark_gpu.make_rows(written, lines))
     found = [(x["real"], x["n"], x["quantity"]) for x in measured]
     assert sorted(found) == sorted(product(("double", "float"), (1, 40), ("jacobian", "acceleration")))
     assert all(x["a_second"] > 0.0 and x["share"] > 0.0 for x in measured)
-    assert benchmark_gpu.table(measured).count("\n") == 1 + len(measured)
+    assert benchmark_gpu.make_table(measured).count("\n") == 1 + len(measured)
 
 
 def test_the_fraction_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> None:
     written = code(urdfkin.load("planar_two_link"), quantities=("jacobian", "acceleration"))
     jacobian, acceleration = written.functions
-    assert benchmark_gpu.bytes_of(written, jacobian, "double") == 8 * (2 + 12)
-    assert benchmark_gpu.bytes_of(written, acceleration, "float") == 4 * (3 * 2 + 6)
+    assert benchmark_gpu.bytes_per_configuration(written, jacobian, "double") == 8 * (2 + 12)
+    assert benchmark_gpu.bytes_per_configuration(written, acceleration, "float") == 4 * (3 * 2 + 6)
     row = {"by": "urdfkin", "quantity": "jacobian", "real": "double", "n": 1000, "s": 1e-3}
-    (found,) = benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1.12e9}), json.dumps(row)])
+    (found,) = benchmark_gpu.make_rows(written, [json.dumps({"bandwidth": 1.12e9}), json.dumps(row)])
     assert found["a_second"] == pytest.approx(1e6)
     assert found["share"] == pytest.approx(0.1)
     with pytest.raises(ValueError, match="did not print the bandwidth"):
-        list(benchmark_gpu.rows(written, [json.dumps(row)]))
+        list(benchmark_gpu.make_rows(written, [json.dumps(row)]))
 
 
 @pytest.mark.slow
@@ -195,13 +195,13 @@ def test_the_benchmark_measures_libraries_of_pytorch_after_a_check(
         text = write(written, "torch").replace("0.4", "0.41", 1)
         monkeypatch.setattr(benchmark_gpu, "write", lambda code, to: text)
     elif wrong:
-        monkeypatch.setattr(benchmark_gpu, "positions", lambda ours, theirs: [1, 0])
-    found = benchmark_gpu.of_torch(robot, "tip", written, "cpu")
+        monkeypatch.setattr(benchmark_gpu, "find_indices", lambda ours, theirs: [1, 0])
+    found = benchmark_gpu.measure_torch(robot, "tip", written, "cpu")
     if wrong:
         with pytest.raises(ValueError, match=wrong):
             list(found)
         return
-    rows = list(benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1e9}), *found]))
+    rows = list(benchmark_gpu.make_rows(written, [json.dumps({"bandwidth": 1e9}), *found]))
     by = [(name, who) for name in ("placement", "jacobian") for who in ("PyTorch", "torch.compile")]
     expected = product([*by, ("jacobian", "PyTorch Kinematics")], ("double", "float"), (1, 3))
     assert [((x["quantity"], x["by"]), x["real"], x["n"]) for x in rows] == list(expected)
@@ -213,8 +213,8 @@ def test_the_benchmark_measures_libraries_of_pytorch_after_a_check(
 def test_the_benchmark_refuses_a_machine_without_compiler_or_gpu(
     compiler: str | None, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(benchmark_gpu, "nvcc", lambda: compiler)
-    monkeypatch.setattr(benchmark_gpu, "gpus", lambda: 0)
+    monkeypatch.setattr(benchmark_gpu, "find_nvcc", lambda: compiler)
+    monkeypatch.setattr(benchmark_gpu, "count_gpus", lambda: 0)
     assert benchmark_gpu.main(["planar_two_link"]) == 2
     assert said in capsys.readouterr().err
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from scripts.benchmarking.operations import operations
+from scripts.benchmarking.operations import count_operations
 from tests.export.writing import ALL, code
 from tests.laws.subjects import robot_of, state
 from urdfkin.compiled.plan import CompiledTree
@@ -166,7 +166,7 @@ def test_exported_code_has_fewer_operations_than_the_general_recursion() -> None
         function = make_function(plan, row, Reference.LOCAL_WORLD_ALIGNED)
         sines = 2 * len(function.angles)
         # `operations` counts 51 operations for a sine and its cosine, `Function` counts two.
-        recursion = operations(plan, row.name) - 51 * len(plan.steps)
+        recursion = count_operations(plan, row.name) - 51 * len(plan.steps)
         assert function.operation_count - sines < 0.75 * recursion
 
 

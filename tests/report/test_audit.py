@@ -10,7 +10,15 @@ from pathlib import Path
 import pytest
 
 from scripts import audit_pages
-from scripts.audit_pages import Page, as_pdf, axe_script, html_checker, html_errors, look, walk
+from scripts.audit_pages import (
+    Page,
+    check_keyboard,
+    check_screen,
+    find_html_checker,
+    find_html_errors,
+    print_to_pdf,
+    read_axe_script,
+)
 from tests.reading import present
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile, months_runs, saved
@@ -35,7 +43,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     for i, report in enumerate([*months_runs(), hostile()]):
         saved(folder / "runs" / f"{i}.json", report)
     texts["history"] = history_page(read_history([folder / "runs"]))
-    texts["same"] = audit_pages.comparison("ur5_limited", 1e-3)
+    texts["same"] = audit_pages.make_same_report("ur5_limited", 1e-3)
     for name, text in texts.items():
         (folder / f"{name}.html").write_text(text, encoding="utf-8")
     return {name: Page(name, (folder / f"{name}.html").as_uri(), audit_pages.UNFOLD) for name in texts}
@@ -52,10 +60,10 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 def test_a_page_has_no_serious_violation_no_error_no_horizontal_scrolling_and_no_request(
     name: str, width: int, dark: bool, pages: dict[str, Page], desk: Browser
 ) -> None:
-    axe = axe_script()
+    axe = read_axe_script()
     if axe is None:
         pytest.skip("axe is not installed: pip install axe-core-python")
-    assert look(desk, pages[name], width, dark, axe) == []
+    assert check_screen(desk, pages[name], width, dark, axe) == []
 
 
 def test_the_audit_detects_faults_of_a_page(tmp_path: Path, desk: Browser) -> None:
@@ -65,13 +73,13 @@ def test_the_audit_detects_faults_of_a_page(tmp_path: Path, desk: Browser) -> No
         "color:#ccc'>pale</p><button></button><a href='#'>a</a><script>missing()</script>"
     )
     page = Page("bad", bad.as_uri())
-    faults = look(desk, page, 390, False, axe_script())
+    faults = check_screen(desk, page, 390, False, read_axe_script())
     assert any("900" in line or "pixels wide" in line for line in faults)
     assert any("missing is not defined" in line for line in faults)
-    if axe_script() is not None:
+    if read_axe_script() is not None:
         assert any("color-contrast" in line for line in faults)
         assert any("button-name" in line for line in faults)
-    found = walk(desk, page)
+    found = check_keyboard(desk, page)
     assert "bad, keyboard: no visible focus on a a" in found
     assert any("no name of button" in line for line in found)
 
@@ -80,15 +88,15 @@ def test_the_audit_detects_faults_of_a_page(tmp_path: Path, desk: Browser) -> No
 def test_the_tab_key_reaches_controls_with_a_name_and_a_visible_focus(
     name: str, pages: dict[str, Page], desk: Browser
 ) -> None:
-    assert walk(desk, pages[name]) == []
+    assert check_keyboard(desk, pages[name]) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_html_of_a_page_has_no_error(name: str, pages: dict[str, Page]) -> None:
-    jar = html_checker()
+    jar = find_html_checker()
     if jar is None:
         pytest.skip("the Nu HTML checker or Java is not installed: see scripts/audit_pages.py")
-    assert html_errors(pages[name], jar) == []
+    assert find_html_errors(pages[name], jar) == []
 
 
 def test_a_printed_page_has_every_drawing_in_light_colours(pages: dict[str, Page], desk: Browser) -> None:
@@ -142,7 +150,7 @@ def test_a_printed_page_has_open_robots_only(pages: dict[str, Page], desk: Brows
 def test_printed_command_lines_take_at_most_half_a_page(
     pages: dict[str, Page], desk: Browser, tmp_path: Path
 ) -> None:
-    (tmp_path / "a.pdf").write_bytes(as_pdf(desk, pages["arms"]))
+    (tmp_path / "a.pdf").write_bytes(print_to_pdf(desk, pages["arms"]))
     text = subprocess.run(
         ["pdftotext", "-layout", str(tmp_path / "a.pdf"), "-"], check=True, capture_output=True, text=True,
         timeout=60,

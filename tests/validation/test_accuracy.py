@@ -140,7 +140,7 @@ def test_equal_seeds_give_equal_studies() -> None:
 
 def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 digits are for 200 joints
-    check_errors(accuracy_study(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
+    check_errors(accuracy_study(urdfkin.load(make_pages.make_askew_chain(20), verify=False), samples=1))
 
 
 @pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
@@ -303,11 +303,11 @@ def test_errors_are_equal_only_if_they_are_the_same_double() -> None:
     counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
     assert more_accurate_counts(lines) == counts
     assert accuracy_words(as_json_data(study)) == f"1 sample; {counts}"
-    assert f"\n{counts}. " in make_pages.study_parts({"arm": study})["counts"]
+    assert f"\n{counts}. " in make_pages.format_studies({"arm": study})["counts"]
 
 
 def test_the_page_marks_the_equal_results_of_polar() -> None:
     lines = as_json_data(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
-    table = make_pages.path_of("accuracy").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
+    table = make_pages.page_path("accuracy").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
     assert [ours == theirs for ours, theirs in rows] == [more_accurate(line) == "equal" for line in lines]

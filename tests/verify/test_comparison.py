@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scripts.check_bits import WAYS
+from scripts.check_bits import MODES
 from urdfkin.compiled.preload import ComputeMode, use_only
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
@@ -21,7 +21,7 @@ scales = st.one_of(
 )
 
 
-@pytest.fixture(autouse=True, params=WAYS)
+@pytest.fixture(autouse=True, params=MODES)
 def _in_both_ways(request: pytest.FixtureRequest) -> Iterator[None]:
     way: ComputeMode = request.param
     with use_only(way):

@@ -164,7 +164,7 @@ def test_mujoco_agrees_for_every_robot_of_the_catalogue(name: str) -> None:
 def test_mujoco_agrees_for_unusual_robots_or_a_reason_is_given(family: str) -> None:
     agreed = 0
     for number in range(4):
-        case = robots.robot(7, family, number)
+        case = robots.make_robot(7, family, number)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from scripts.check_bits import WAYS
+from scripts.check_bits import MODES
 from tests.cli.running import urdfkin as command
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import CompiledTree
@@ -198,7 +198,7 @@ def test_coupled_columns_are_the_product_with_g_to_the_last_bit(data: st.DataObj
     with np.errstate(all="ignore"):
         for column in columns:
             expected[..., index[column]] += J[..., column] * factor[column]
-    for way in WAYS:
+    for way in MODES:
         with use_only(way):
             np.testing.assert_array_equal(couple_columns(J, columns, index, factor, nv), expected)
 

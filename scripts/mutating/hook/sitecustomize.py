@@ -22,10 +22,10 @@ CODE = os.environ.get("URDFKIN_MUTANT_CODE", "")
 
 class _Loader(importlib.machinery.SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
-        from scripts.mutating.operators import mutated, replaced
+        from scripts.mutating.operators import apply_change, replace_code
 
         source = Path(self.path).read_text(encoding="utf-8")
-        tree = mutated(source, int(NUMBER)) if NUMBER else replaced(source, *json.loads(CODE))
+        tree = apply_change(source, int(NUMBER)) if NUMBER else replace_code(source, *json.loads(CODE))
         return compile(tree, str(self.path), "exec")
 
 

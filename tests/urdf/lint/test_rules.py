@@ -145,13 +145,13 @@ def test_missing_mimicked_joints_are_errors_if_mimic_is_true() -> None:
 def test_the_page_of_findings_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    page = make_pages.path_of("findings").read_text("utf-8")
-    assert page == make_pages.page("findings"), "run python scripts/make_pages.py findings"
+    page = make_pages.page_path("findings").read_text("utf-8")
+    assert page == make_pages.make_page("findings"), "run python scripts/make_pages.py findings"
 
 
 @pytest.mark.slow
 def test_a_robot_of_the_catalogue_has_at_most_five_warnings() -> None:
-    assert max(len(make_pages.warnings_of(robot)) for robot in catalogue()) <= 5
+    assert max(len(make_pages.list_warnings(robot)) for robot in catalogue()) <= 5
 
 
 # -- comments ------------------------------------------------------------------------------------------------

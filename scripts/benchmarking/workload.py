@@ -1,4 +1,4 @@
-"""A subject of the benchmark: one robot, one frame, and the configurations that all contenders compute."""
+"""A workload of the benchmark: one robot, one frame, and the configurations that all contenders compute."""
 
 import contextlib
 import tempfile
@@ -16,13 +16,13 @@ from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
 #: Most joints of the humanoid talos do not move the chosen frame.
-SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
+ROBOT_FRAMES = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls.
 LOOP = 2_000
 TIP = "tip"
 
 
-class Subject:
+class Workload:
     """The common input of all contenders: one robot and frame, q (n, nq), v and a (n, nv).
 
     The robot is loaded without mimic rules, so that every library has the same coordinates.
@@ -62,11 +62,11 @@ class Subject:
         file.write_text(self.urdf, "utf-8")
         return file
 
-    def width(self, quantity: str) -> tuple[int, ...]:
+    def result_shape(self, quantity: str) -> tuple[int, ...]:
         return (6, self.nv) if quantity == "jacobian" else (6,)
 
-    def numbers(self, quantity: str) -> int:
-        return int(np.prod(self.width(quantity)))
+    def result_size(self, quantity: str) -> int:
+        return int(np.prod(self.result_shape(quantity)))
 
     def inputs(self, quantity: str, n: int) -> tuple[FloatArray, ...]:
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
