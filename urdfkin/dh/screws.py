@@ -42,7 +42,9 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Largest deviation of a handwritten axis from length 1, of a pitch (m/rad) from 0, and of M from a rotation.
+#: Tolerance of handwritten screws and of M.
+#: The length of an axis may differ from 1 by this number, and the pitch (m/rad) from 0.
+#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -276,9 +278,9 @@ def screws_from_rows(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    `screws` has a row (w, v) for each joint. An array (6, n) with a column for each joint, as in Modern
-    Robotics, is also accepted if n is not six. `M` is the (4, 4) or (3, 4) pose of the tip in the zero
-    configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
+    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics, with
+    a column for each joint, is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the tip in the
+    zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
     screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)

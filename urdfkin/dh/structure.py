@@ -66,9 +66,9 @@ class AxisPair:
 class StructureKind:
     """A geometric property of consecutive joints, for example "spherical wrist".
 
-    `radians` and `metres` are the largest deviations from the exact property, for example of the axes from a
-    common intersection. `at` is the intersection of the axes in the base frame, in the zero configuration
-    (metres).
+    `radians` and `metres` are the largest deviations from the exact property. For a spherical wrist, `metres`
+    is the largest distance of an axis from the point `at`. `at` is the intersection of the axes in the base
+    frame, in the zero configuration (metres).
     """
 
     name: str
@@ -159,7 +159,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis from it."""
+    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))

@@ -268,7 +268,7 @@ class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
     Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    its distance from this origin. The sum of these bounds is a bound for all changes together.
+    the distance between the tip and this origin. The sum of these bounds is a bound for all changes together.
 
     Attributes:
         tolerance: The requested tolerance (rad).
@@ -548,7 +548,8 @@ class DHTable(Displayable):
         """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, rad or m, or by name, as a mapping or text.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or the values by name as a mapping
+                or text.
 
         Raises:
             InputError: `q` has the wrong length.

@@ -1,4 +1,4 @@
-"""The functions of one frame that are exported, and the text of their expressions."""
+"""Collect the exported functions of one frame, and write the functions' expressions as text."""
 
 from __future__ import annotations
 

@@ -2,9 +2,9 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if its shape is closer
-to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation. The
-function fits at most three interpretations.
+`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if the robot's shape is
+closer to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation.
+The function fits at most three interpretations.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Cost of each difference from the file's interpretation, as a fraction of the smallest difference of shapes.
-#: The tolerance is added to this cost.
+#: Each difference from the file's interpretation has the same cost.
+#: The cost is the tolerance, plus this fraction of the smallest shape difference from the URDF.
 _DIFFERENCE_COST = 0.1
 #: The tip error of a better interpretation is at most this fraction of the reach.
-#: It is also at most this fraction of the tip error of the file's interpretation.
-#: A tip error within the tolerance always suffices.
+#: The tip error is also at most this fraction of the tip error of the file's interpretation.
+#: A tip error within the tolerance is always small enough.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
@@ -79,8 +79,8 @@ def find_better_interpretation(
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
     `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
-    is the tip error with the interpretation that the file states. With the returned interpretation, the tip
-    error is at most 5 % of `stated_error` and of the reach, or at most `tolerance` (metres).
+    is the tip error with the interpretation that the file states. The returned interpretation has a tip error
+    of at most `tolerance` (metres), or at most 5 % of `stated_error` and at most 5 % of the reach.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -158,10 +158,11 @@ def find_dh_convention(
 
 
 def path_shape(table: DHTable, scale: float) -> FloatArray:
-    """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
+    """Return the offset, the distance and the angle of each pair of consecutive axes.
 
-    Joint signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices
-    are 0: all lengths next to a prismatic axis, and the offset along the first axis of the path.
+    The angles are multiplied by `scale`. Joint signs, joint offsets, base and tool do not change the result.
+    Numbers that depend on free choices are 0: all lengths next to a prismatic axis, and the offset along the
+    first axis of the path.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -190,7 +191,10 @@ class Interpretation:
     columns: tuple[str, ...] = COLUMNS
 
     def table(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
+        """Return the table in this interpretation, without base and tool.
+
+        Raise InputError if the table is not valid in this interpretation.
+        """
         stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         contents = dict(zip(COLUMNS, self.columns, strict=True))
         rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]
