@@ -224,7 +224,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
             found=found,
-            remedy="write numbers without a variable into all other cells of the row",
+            remedy="write only numbers into all other cells of the row",
         )
     if cell.factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(

@@ -167,10 +167,9 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
             raise InputError(
-                f"a {joint.kind.value} joint has no single axis and no row",
+                f"a {joint.kind.value} joint has several axes, but a row of the table has one axis",
                 where=f"joint {joint.name}",
-                remedy="load the robot without root_joint, or derive tables of the paths on either side"
-                " of this joint",
+                remedy="load the robot without root_joint, or derive tables of paths without this joint",
             )
     lengths = _path_lengths(tree)
     links = _find_link_axes(tree, lengths)

@@ -114,7 +114,7 @@ class Proof:
             f"{name} {k:.3g}" for name, k in self.single_precision_bounds.items() if name not in beyond
         )
         lines = [
-            "Error bounds in single precision, with the rounding of constants, in eps*scale (eps = 2^-23):",
+            "Error bounds in single precision, with rounded constants; unit eps*scale, eps = 2^-23:",
             f"  {bounds}",
         ]
         return [

@@ -192,7 +192,7 @@ def _make_check(
 
 _STACKED = '''
 def _stacked({given}values, zero, shape):
-    """Stack numbers, whose batch shapes broadcast to that of `zero`, as an array (..., *shape)."""
+    """Return an array (..., *shape) of the numbers `values`. The batch shape is the shape of `zero`."""
     batch = tuple(zero.shape)
     values = [{xp}.broadcast_to(x, batch) for x in values]
     return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
@@ -325,7 +325,7 @@ DIALECTS = {
     "jax": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
         "broadcast. The functions support jit, vmap and grad.\n"
-        "XLA's fusion pass takes minutes to compile long chains; this line disables the pass:\n"
+        "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_make_check("not jnp.issubdtype(x.dtype, jnp.floating)")

@@ -251,18 +251,19 @@ def find_table_warnings(table: DHTable) -> list[str]:
     lengths = [abs(length) for length in (*columns["a"], *columns["d"])]
     if lengths and max(lengths) > _MAX_LENGTH and all(length > _MIN_LENGTH * 1e3 for length in lengths):
         warnings.append(
-            f"lengths up to {max(lengths):.4g} m look like millimetres:"
-            " if they are millimetres, write lengths = 'millimetres'"
+            f"lengths up to {max(lengths):.4g} m look like numbers in millimetres:"
+            " for a table in millimetres, write lengths = 'millimetres'"
         )
     elif lengths and max(lengths) < _MIN_LENGTH * 2.0:
         warnings.append(
-            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like metres:"
-            " if they are metres, write lengths = 'metres'"
+            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like numbers in metres:"
+            " for a table in metres, write lengths = 'metres'"
         )
     angles = [*columns["alpha"], *columns["theta"]]
     if angles and all(looks_round(math.degrees(angle)) for angle in angles):
         warnings.append(
-            "angles of 1.57 degrees look like radians: if they are radians, write angles = 'radians'"
+            "angles of 1.57 degrees look like numbers in radians:"
+            " for a table in radians, write angles = 'radians'"
         )
     for length, angle in (("a", "alpha"), ("d", "theta")):
         lengths_look_round = len(columns[length]) > 1 and all(map(looks_round, columns[length]))
