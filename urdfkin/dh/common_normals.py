@@ -132,7 +132,10 @@ def _find_parallel_transform(
 def find_hayati_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
 ) -> AxisTransform:
-    """Return the transform for a Hayati row; x points to the next axis's intersection with the xy plane."""
+    """Return the transform for a Hayati row.
+
+    The x axis points to the intersection of the next axis with the xy plane.
+    """
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -228,7 +231,7 @@ class PairWithReference:
         """Return the transform between the two axes.
 
         `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
-        offset for the row (m); it is ignored if the two axes determine the offset.
+        offset for the row (m). `d` is ignored if the two axes determine the offset.
         """
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
@@ -339,7 +342,7 @@ def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
 
 
 def match_theta(theta: float, reference: float) -> float:
-    """Return the reference if the two angles differ only by rounding; otherwise theta."""
+    """Return `reference` if the two angles differ only by rounding. Otherwise, return theta."""
     return (
         reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )

@@ -3,10 +3,10 @@
 `urdfkin.dh.table` defines the conventions and the factors X. The conversion to the modified convention moves
 the factor X_n of the last row into the tool. If the base has the form Tx(a) Rx(alpha), the first modified row
 contains this a and this alpha, and the base becomes the identity. The conversion to the standard convention
-does the opposite, so that a conversion to the other convention and back gives the original table.
+does the opposite. Therefore, a conversion to the other convention and back gives the original table.
 
-In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis: frame i - 1
-of a standard table, or frame i of a modified table.
+In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis. This frame
+is frame i - 1 of a standard table, or frame i of a modified table.
 """
 
 from __future__ import annotations

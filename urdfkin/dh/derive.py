@@ -158,7 +158,7 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
-    """Shift the axes of prismatic joints; such a joint defines only the direction of its axis."""
+    """Shift the axes of prismatic joints. A prismatic joint defines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)

@@ -66,7 +66,10 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
-    """Find the table in a text, and return it as plain data; raise InputError without a valid table."""
+    """Find the table in a text, and return the table as plain data.
+
+    Raise InputError if the text has no valid table.
+    """
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
         if (grid := form(lines)) is not None:

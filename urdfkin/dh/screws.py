@@ -166,8 +166,8 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation error that rounding causes in `placement`, in units of the machine epsilon.
 
-        The bound is twice the bound for a Denavit-Hartenberg table of the same path, and does not contain the
-        effect of rounding in q.
+        The bound is twice the bound for a Denavit-Hartenberg table of the same path. The bound does not
+        contain the effect of rounding in q.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
@@ -192,8 +192,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        In the zero configuration each link frame is parallel to the base frame, with its origin on the axis
-        of the link's joint.
+        In the zero configuration, each link frame is parallel to the base frame. The origin of each link
+        frame is on the axis of the link's joint.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
@@ -254,7 +254,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to M, whose numbers may be rounded; an exact M is unchanged."""
+    """Return the rigid transform nearest to M. The numbers in M may be rounded. An exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]

@@ -7,8 +7,8 @@ tolerance. Three kinds of angles are snapped:
 2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
-A changed angle rotates the rest of the chain about the origin of one joint. `SnapReport` contains a
-bound of the tip's displacement.
+A changed angle rotates the rest of the chain about the origin of one joint. `SnapReport` contains a bound of
+the tip's displacement.
 """
 
 from __future__ import annotations
@@ -202,7 +202,10 @@ def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) ->
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a `SnapChange` for each snapped joint origin; its `lever` is the path length to the tip."""
+    """Return a `SnapChange` for each snapped joint origin.
+
+    The `lever` of a change is the path length (m) from the joint origin to the tip.
+    """
     changes, lever, prismatic_joints = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):

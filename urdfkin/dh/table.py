@@ -247,8 +247,8 @@ class SnapChange:
         angle: Angle (rad) of this rotation.
         lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
             zero.
-        prismatic_joints: Prismatic joints between the centre and the tip; their travel increases the
-        distance.
+        prismatic_joints: Prismatic joints between the rotation's centre and the tip. The travel of these
+            joints increases the distance.
     """
 
     row: int

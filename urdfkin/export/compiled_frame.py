@@ -1,8 +1,8 @@
 """Compile the kinematics of one frame to machine code, the fastest way to compute in urdfkin.
 
-The first call of a quantity exports C code, compiles the code with the system's compiler, and compares the
-results of the machine code with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which
-Numba compiles.
+The first call of a quantity exports C code, and compiles the code with the system's compiler. The first call
+also compares the results of the machine code with Pinocchio. Without a C compiler, urdfkin uses the forward
+recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key in the cache consists of the C code, the compiler and
 the processor. The code is loaded from memory, because another program could change a file after the test of

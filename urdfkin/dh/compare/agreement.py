@@ -135,7 +135,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
+    """Return the robot's reach (metres). Angles times the reach are compared with lengths.
 
     A table without Hayati rows may have offsets of kilometres. The path length of a URDF that was made from
     this table is then far larger than the reach.

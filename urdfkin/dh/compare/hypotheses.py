@@ -76,7 +76,7 @@ class BetterInterpretation:
 def find_better_interpretation(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
 ) -> BetterInterpretation | None:
-    """Return the interpretation with which a table agrees with a URDF; None if there is none.
+    """Return the interpretation with which a table agrees with a URDF, or None.
 
     `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
     is the tip error with the interpretation that the file states. The returned interpretation has a tip error
