@@ -130,11 +130,11 @@ def test_a_comparison_names_the_fitting_interpretation_and_exits_with_1(tmp_path
 def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:
     deg = {"angles": "degrees"}
     assert (
-        "look like radians"
+        "look like numbers in radians"
         in find_table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
     )
     metres = table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm")
-    assert "look like metres" in find_table_warnings(metres)[0]
+    assert "look like numbers in metres" in find_table_warnings(metres)[0]
     exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
     assert "a and alpha look exchanged" in find_table_warnings(table_from_rows(exchanged, "standard"))[0]
     for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):
@@ -145,7 +145,7 @@ def test_loading_a_table_that_looks_like_millimetres_causes_a_warning() -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         load(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"), verify=False)
-    assert "lengths up to 425 m look like millimetres" in str(caught[0].message)
+    assert "lengths up to 425 m look like numbers in millimetres" in str(caught[0].message)
     assert caught[0].category is UrdfWarning
     with warnings.catch_warnings():
         warnings.simplefilter("error")

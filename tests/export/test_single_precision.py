@@ -255,7 +255,7 @@ def test_a_printed_bound_is_rounded_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:
     text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).header
-    words = "with the rounding of constants, in eps*scale (eps = 2^-23):"
+    words = "with rounded constants; unit eps*scale, eps = 2^-23:"
     assert f"Error bounds in single precision, {words}" in text
     (line,) = (x for x in text if x.startswith("  placement ") and ", jacobian " in x)
     assert 1.0 < float(line.split()[1].rstrip(",")) < 24.0 * 7

@@ -5,16 +5,16 @@ this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
-motion of the first joint, so they are part of its row. In the same way, the factors Rz(phi_next) and
-Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0, and the other six numbers are
-unique except for the direction of x (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel
-and for nearly parallel axes.
+The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. Both factors commute
+with the motion of the first joint. Therefore, both factors are part of the first joint's row. In the same
+way, the factors Rz(phi_next) and Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0,
+and the other six numbers are unique except for the direction of x (Denavit and Hartenberg). docs/dh.md
+explains the numbers for parallel and for nearly parallel axes.
 
-The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. `match_axis_transforms` copies d and theta from a reference table, except
-for one row. The d or the theta of this row is chosen so that the sum is correct for the path. In a Hayati
-row, d can also be chosen freely, because the two axes do not determine d.
+The pose of the tip determines only the sum of the offsets d along parallel axes. For coinciding axes, the
+pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta from a reference
+table, except for one row. The d or the theta of this row is chosen so that the sum is correct for the path.
+In a Hayati row, d can also be chosen freely, because the two axes do not determine d.
 """
 
 from __future__ import annotations
@@ -132,7 +132,10 @@ def _find_parallel_transform(
 def find_hayati_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
 ) -> AxisTransform:
-    """Return the transform for a Hayati row; x points to the next axis's intersection with the xy plane."""
+    """Return the transform for a Hayati row.
+
+    The x axis points to the intersection of the next axis with the xy plane.
+    """
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -206,9 +209,10 @@ class PairWithReference:
 
         The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
         Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
-        is the same as in the reference. If the tilt is small, this component is inaccurate. The component is
-        then computed by Pythagoras from the length a and the perpendicular component of v. The result is None
-        for parallel axes, or if it would exceed `reach`.
+        is the same as in the reference. If the tilt is small, the component in the tilt direction is
+        inaccurate. The theorem of Pythagoras then gives this component from the length a and the
+        perpendicular component of v. The result is None if the two axes are parallel in the path or in the
+        reference. The result is also None if the distance exceeds `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_sine(self.A), math.hypot(along, across)
@@ -227,7 +231,7 @@ class PairWithReference:
         """Return the transform between the two axes.
 
         `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
-        offset for the row (m); it is ignored if the two axes determine the offset.
+        offset for the row (m). `d` is ignored if the two axes determine the offset.
         """
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
@@ -242,7 +246,7 @@ class PairWithReference:
     def offset_before(self, delta_next: float) -> float:
         """Return the offset (m) along the first axis from the DH frame to the joint's frame, for d = 0.
 
-        `delta_next` is the same offset along the second axis, for the next joint.
+        `delta_next` is the offset (m) along the second axis from the next DH frame to the next joint's frame.
         """
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
@@ -250,12 +254,13 @@ class PairWithReference:
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return the transforms between the axes, and theta of each row, as close to a reference as possible.
+    """Return the transform of each pair of axes, and theta of the pair's first row.
 
-    `phi_in` is the angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is
-    the offset (m) along the first axis between these frames. `tip_offset` is the offset (m) along the last
-    axis from the DH frame to the joint's frame. With this offset, d of the last row equals the reference. If
-    `tip_offset` is None, d of the last row may differ from the reference.
+    The free choices bring the cells close to the cells of the reference table. `phi_in` is the angle (rad)
+    about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m) along the first
+    axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH frame to the
+    joint's frame. With this offset, d of the last row equals the reference. If `tip_offset` is None, d of the
+    last row may differ from the reference.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -276,7 +281,7 @@ def match_axis_transforms(
 def _choose_offset(
     pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None
 ) -> float:
-    """Return the reference's d, or the d for which another cell of the table equals the reference.
+    """Return d for row i: the reference's d, or a d that makes another cell equal to the reference's cell.
 
     The other cell is the cell d of a later row, or the cell a of a Hayati row.
     """
@@ -291,7 +296,8 @@ def _choose_offset(
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # If the rows i to end - 1 contain a Hayati row, d is chosen to give this row the reference's a.
+        # One of the rows i to end - 1 may be a Hayati row.
+        # Then d is chosen so that a of the Hayati row equals the reference's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -307,7 +313,7 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return the phi that gives the reference's theta in this row, or in the next prismatic rows."""
+    """Return phi so that row i, or the prismatic rows after row i, have the reference's theta."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -336,7 +342,7 @@ def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
 
 
 def match_theta(theta: float, reference: float) -> float:
-    """Return the reference if the two angles differ only by rounding; otherwise theta."""
+    """Return `reference` if the two angles differ only by rounding. Otherwise, return theta."""
     return (
         reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )
@@ -373,7 +379,7 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Largest angle (rad) and length (m) in a constant pose that are attributed to rounding."""
+    """Angles up to `radians` and lengths up to `metres` in a constant pose are treated as rounding errors."""
 
     radians: float
     metres: float
@@ -382,9 +388,9 @@ class PoseTolerance:
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     """Return the tolerance for rounding errors in a constant pose.
 
-    The constant pose is the product of the origin transforms of `joints` joints. `length` is the sum of the
-    offsets of these joints (m), and `reach` is the length of the whole path. The tolerance covers angles that
-    a program rounded to fifteen digits.
+    The constant pose is a product of joint origin transforms. `joints` is the number of these transforms.
+    `length` is the sum of the lengths of their offsets (m), and `reach` is the length of the whole path (m).
+    The tolerance covers angles that a program rounded to fifteen digits.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)

@@ -3,10 +3,10 @@
 `urdfkin.dh.table` defines the conventions and the factors X. The conversion to the modified convention moves
 the factor X_n of the last row into the tool. If the base has the form Tx(a) Rx(alpha), the first modified row
 contains this a and this alpha, and the base becomes the identity. The conversion to the standard convention
-does the opposite, so that a conversion to the other convention and back gives the original table.
+does the opposite. Therefore, a conversion to the other convention and back gives the original table.
 
-In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis: frame i - 1
-of a standard table, or frame i of a modified table.
+In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis. This frame
+is frame i - 1 of a standard table, or frame i of a modified table.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
-#: URDF requires limits of prismatic joints, so a joint without limits gets these (m, m/s and N).
+#: URDF requires limits of a prismatic joint.
+#: A prismatic joint without limits gets these limits (m, m/s and N).
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
@@ -86,7 +87,10 @@ def to_urdf(table: DHTable) -> str:
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Return the tree without limits and mimic rules: each row has its own coordinate, in row order."""
+    """Return the table's tree without limits and mimic rules.
+
+    The tree has one coordinate for each row, in row order.
+    """
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return make_serial_tree(table.robot, link_names(table), joints)
@@ -110,7 +114,10 @@ def _serial_joints(
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the pose of each joint frame and of the tip in the frame before it, with joints at zero."""
+    """Return the pose of each joint frame in the previous frame, and the pose of the tip in the last frame.
+
+    All joints are at zero.
+    """
     if not table.rows:
         return [table.base @ table.tool]
     if table.convention is DHConvention.STANDARD:

@@ -81,7 +81,8 @@ class DerivationOptions:
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
-    `like` is a standard table of the same joints; its frames have priority over `options`.
+    `like` is a standard table of the same joints. The result has the directions of x of `like`, and the
+    offsets of `like` along parallel axes. Of `options`, `sign` and the value "each" have no effect then.
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -144,7 +145,7 @@ def _make_table(
 
 
 def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Return the constant poses after the z axes of the joints in `flip` are reversed."""
+    """Reverse the z axis of each joint in `flip`, and return the new constant poses of the chain."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -157,7 +158,7 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
-    """Shift the axes of prismatic joints; such a joint defines only the direction of its axis."""
+    """Shift the axes of prismatic joints. A prismatic joint defines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -289,9 +290,9 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Give the first row the theta of the first row of `like`, and change the base to compensate.
+    """Copy theta of the first row from `like`, and change the base to compensate.
 
-    If d is 0 in `like`, d of the first row becomes 0 too.
+    If d is 0 in the first row of `like`, d of the first row becomes 0 too.
     """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
@@ -304,10 +305,10 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Give the last row the theta, a and alpha of the last row of `like`; change the tool to compensate.
+    """Copy theta, a and alpha of the last row from `like`, and change the tool to compensate.
 
-    If d is 0 in `like`, d of the last row becomes 0 too. If neither table has a tool and the angles theta are
-    nearly equal, no cell changes, except that rounding errors are removed from theta.
+    If d is 0 in the last row of `like`, d of the last row becomes 0 too. Suppose that neither table has a
+    tool, and that the two angles theta are nearly equal. Then only rounding errors are removed from theta.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
@@ -351,9 +352,10 @@ def _make_last_row(
     options: DerivationOptions,
     noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Return theta and d of the last row, its other cells, and the tool.
+    """Return theta and d of the last row, the transform with a and alpha of the last row, and the tool.
 
-    `A` is the tip's pose in a frame with the axes of the last joint's frame and the origin O_{n-1}.
+    `A` is the tip's pose in a frame with the origin O_{n-1}. The axes of this frame are parallel to the axes
+    of the last joint's frame.
     """
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])

@@ -25,14 +25,15 @@ from urdfkin.model.tree import KinematicTree
 #: If the cells of two tables differ by more than this number, the tables describe different robots.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
-#: Two cells theta (rad), or two entries of rotation matrices, count as equal up to this difference.
+#: Two angles theta are treated as equal if their difference is at most this number (rad).
+#: Two entries of rotation matrices are treated as equal if their difference is at most this number.
 _ZERO_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
-    """Return a chain's table, and take the free choices of its frames from a reference table.
+    """Return the table of a chain. The reference table determines the free choices of the frames.
 
     `options.flip` must be the result of `find_reversed_joints`.
     """
@@ -49,7 +50,8 @@ def find_reversed_joints(
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
-    # Base and tool can compensate for a reversed first or last joint, so both signs of each are tried.
+    # The base can compensate for a reversed first joint, and the tool for a reversed last joint.
+    # Therefore, both signs of the first joint and both signs of the last joint are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -130,18 +132,21 @@ def make_dh_table(
             the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
-            axis. "joint": the base contains this transform, and d_1 and theta_1 are zero (Craig's frame 0).
+            axis. "joint": the base contains the transform to the first axis, and d_1 and theta_1 are zero
+            (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
         slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
-            direction. "drawn": the axis passes through the joint's origin in the URDF, unless a shift avoids
-            a base, a tool or a distant common normal. "minimal": the axis passes through the origin of the
-            next joint, or of the previous joint, if that joint is revolute. The length a between
-            these two axes is then 0.
+            direction. "drawn": the axis passes through the joint's origin in the URDF. The axis is shifted if
+            the shift avoids a translation of the base, a tool, or a distant common normal. "minimal": the
+            axis passes through the origin of the next joint if the next joint is revolute. Otherwise, the
+            axis passes through the origin of the previous joint if the previous joint is revolute. The length
+            a between the two axes is then 0.
         like: A published table. The result has the published table's positive joint directions and
-            directions of x. It also has the published table's offsets along parallel axes, and its zero
-            positions of the first and the last joint. All other numbers come from the URDF. With `like`, the
-            arguments `flip`, `first`, `last`, `sign` and `parallel_offset` are ignored.
+            directions of x. The result also has the published offsets along parallel axes, and the published
+            zero positions of the first and the last joint. All other numbers come from the URDF. With `like`,
+            the arguments `flip` and `sign` are ignored. The arguments `first`, `last` and `parallel_offset`
+            must keep their default values, because "joint", "flange" and "first" change the published frames.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

@@ -1,9 +1,9 @@
 """Read tables from TOML files, JSON files, and plain text copied from a document or web page.
 
-`urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings that
-contains a, alpha, d and theta in any order, and below it a line for each joint. Commas, semicolons, tabs,
-bars, ampersands or blanks separate the cells. The lines before and after the table may state the convention,
-names, base and tool, as in the tables that urdfkin prints.
+`urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings with a,
+alpha, d and theta in any order. Below the headings, the table has a line for each joint. Commas, semicolons,
+tabs, bars, ampersands or blanks separate the cells. The lines before and after the table may state the
+convention, names, base and tool, as in the tables that urdfkin prints.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ _PRINTED_TOLERANCE = 1e-5
 _POSE_LINES = 6
 #: A line such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: A line `# key: value` in CSV; `table_from_mapping` rejects unknown keys.
+#: A line `# key: value` in CSV, with any key.
+#: `table_from_mapping` rejects unknown keys.
 _CSV_SETTING = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
 _NAMES = {
     **{name: name for name in ("mimicked_joint", "multiplier", "sense", *LIMIT_KEYS)},
@@ -65,7 +66,10 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
-    """Find the table in a text, and return it as plain data; raise InputError without a valid table."""
+    """Find the table in a text, and return the table as plain data.
+
+    Raise InputError if the text has no valid table.
+    """
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
         if (grid := form(lines)) is not None:
@@ -269,7 +273,10 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """Return the convention that the headings or the text name; None if the text names none or both."""
+    """Return the convention that the headings or the text around the table name.
+
+    Return None if no convention is named, or if both conventions are named.
+    """
     if any(column.previous for column in grid.columns):
         return "modified"
     text = "\n".join(map(to_plain_text, grid.other_lines))
@@ -332,7 +339,7 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _add_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
-    """Return the plain text of a cell, with the unit of its column if the cell has none."""
+    """Return the plain text of a cell. If a nonzero number has no unit, add the unit of the column."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", original) if decimal_commas else original
     try:
         cell = parse_cell(text)
@@ -354,7 +361,7 @@ def _unescape(name: str) -> str:
 
 
 def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
-    """Move the cells of the mimic rule, and the cells of the limits, into mappings of their own.
+    """Move the cells of the mimic rule into the mapping `mimic`, and the cells of the limits into `limit`.
 
     If the row has no mimic rule, the cell `offset` is added to theta or d.
     """
@@ -371,8 +378,8 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
     """Replace the variable of another joint, such as q1 in row 2, by a mimic rule.
 
-    `coordinates` contains the names of the joints with the variables q1, q2, ... in this order. If it is
-    empty, q1, q2, ... are the variables of rows 1, 2, ...
+    The i-th name in `coordinates` is the joint with the variable qi. If `coordinates` is empty, qi is the
+    variable of row i.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -406,7 +413,10 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table file; a .txt file may also be a URDF."""
+    """Whether a robot's source is the path of a table file.
+
+    A .txt file that begins with "<" is a URDF, and not a table.
+    """
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:
@@ -500,7 +510,7 @@ _PARSERS: dict[str, Callable[[str], Any]] = {
 
 
 def published_tables() -> dict[str, Path]:
-    """Return the files of the published tables that urdfkin contains, by name."""
+    """Return a mapping from the name of each published table in urdfkin to the table's file."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 

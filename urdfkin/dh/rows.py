@@ -11,7 +11,7 @@ All formats are converted to the same mapping:
     rows = [{joint = "j1", kind = "revolute", a = 0, alpha = "-pi/2", d = 0.3, theta = 0}, ...]
 
 A row may also be a list [a, alpha, d, theta, "R" or "P"]. `theta` and `d` are the constant parts, without the
-joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
+joint's value. In a modified table, a and alpha of row i are a_{i-1} and alpha_{i-1}. The entry `mimic` of a
 row is {mimicked_joint, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units
 apply to cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio
 of two joint values in SI units. An effort is in N or N m.
@@ -139,7 +139,7 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
-    Nearly all angles in tables are multiples of 15 degrees. Most lengths are not multiples of 15 or of pi/12.
+    Nearly all angles in tables are multiples of 15 degrees. A length is rarely a multiple of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):
@@ -224,7 +224,7 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
             "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
             found=found,
-            remedy="write numbers without a variable into all other cells of the row",
+            remedy="write only numbers into all other cells of the row",
         )
     if cell.factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
@@ -359,8 +359,8 @@ def table_from_rows(
     """Make a table from handwritten rows.
 
     Args:
-        rows: The rows. Each is a `DHRow` (always metres and radians), a mapping with the row's fields, or a
-            list [a, alpha, d, theta] with an optional "R" or "P".
+        rows: The rows. Each row is a `DHRow`, a mapping with the row's fields, or a list. A `DHRow` is always
+            in metres and radians. A list is [a, alpha, d, theta] with an optional "R" or "P" at the end.
         convention: "standard" or "modified".
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".

@@ -42,7 +42,9 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Largest deviation of a handwritten axis from length 1, of a pitch (m/rad) from 0, and of M from a rotation.
+#: Tolerance of handwritten screws and of M.
+#: The length of an axis may differ from 1 by this number, and the pitch (m/rad) from 0.
+#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -164,8 +166,8 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation error that rounding causes in `placement`, in units of the machine epsilon.
 
-        The bound is twice the bound for a Denavit-Hartenberg table of the same path, and does not contain the
-        effect of rounding in q.
+        The bound is twice the bound for a Denavit-Hartenberg table of the same path. The bound does not
+        contain the effect of rounding in q.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
@@ -190,8 +192,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        In the zero configuration each link frame is parallel to the base frame, with its origin on the axis
-        of the link's joint.
+        In the zero configuration, each link frame is parallel to the base frame. The origin of each link
+        frame is on the axis of the link's joint.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
@@ -252,7 +254,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to M, whose numbers may be rounded; an exact M is unchanged."""
+    """Return the rigid transform nearest to M. The numbers in M may be rounded. An exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -276,9 +278,9 @@ def screws_from_rows(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    `screws` has a row (w, v) for each joint. An array (6, n) with a column for each joint, as in Modern
-    Robotics, is also accepted if n is not six. `M` is the (4, 4) or (3, 4) pose of the tip in the zero
-    configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
+    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics, with
+    a column for each joint, is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the tip in the
+    zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
     screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)

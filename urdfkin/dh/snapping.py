@@ -7,8 +7,8 @@ tolerance. Three kinds of angles are snapped:
 2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
-Each changed angle only rotates the rest of the chain about the origin of one joint. `SnapReport` contains a
-bound of the tip's displacement.
+A changed angle rotates the rest of the chain about the origin of one joint. `SnapReport` contains a bound of
+the tip's displacement.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Assumed range (rad or metres) of a mimicked joint that is not on the path.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest deviation of a cell that `find_noisy_cells` returns (rad, or relative to the table's span).
+#: `find_noisy_cells` returns cells with a deviation up to this number (rad, or relative to the table's span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -59,7 +59,10 @@ def check_snap_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles, and each change with the index of the changed constant pose."""
+    """Return the chain with snapped angles, and the changes.
+
+    Each change has the index k of the changed constant pose A_k.
+    """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = make_chain(snapped_tree, tip, base)
@@ -199,7 +202,10 @@ def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) ->
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a `SnapChange` for each snapped joint origin; its `lever` is the path length to the tip."""
+    """Return a `SnapChange` for each snapped joint origin.
+
+    The `lever` of a change is the path length (m) from the joint origin to the tip.
+    """
     changes, lever, prismatic_joints = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -253,8 +259,8 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 def snap_hint(table: DHTable, make_snapped_table: Callable[[float], DHTable]) -> str | None:
     """Recommend the tolerance that leaves the fewest noisy cells; None if no tolerance helps.
 
-    A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
-    rounded, for example to 1.5708.
+    A noisy cell differs slightly from 0 or from a multiple of 15 degrees. The reason is a rounded angle in
+    the file, for example 1.5708.
     """
     noisy = find_noisy_cells(table) if table.snap is None else []
     if not noisy:

@@ -66,9 +66,9 @@ class AxisPair:
 class StructureKind:
     """A geometric property of consecutive joints, for example "spherical wrist".
 
-    `radians` and `metres` are the largest deviations from the exact property, for example of the axes from a
-    common intersection. `at` is the intersection of the axes in the base frame, in the zero configuration
-    (metres).
+    `radians` and `metres` are the largest deviations from the exact property. For a spherical wrist, `metres`
+    is the largest distance of an axis from the point `at`. `at` is the intersection of the axes in the base
+    frame, in the zero configuration (metres).
     """
 
     name: str
@@ -97,7 +97,8 @@ class Structure:
       point of the first axis that is nearest to the base's origin.
     - The first joint is prismatic, or no joint moves: the base's origin.
 
-    A prismatic joint without limits makes `reach` infinite; its samples are within `ASSUMED_LIMIT` of zero.
+    If a prismatic joint has no limits, `reach` is infinite. In the sampled configurations, this joint is
+    within `ASSUMED_LIMIT` of zero.
     """
 
     robot: str
@@ -159,7 +160,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis from it."""
+    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -399,9 +400,9 @@ def _read_parameters(table: DHTable) -> OpwParameters:
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
 
-    The first vector begins at the base, and the last vector ends at the tip. If two
-    consecutive axes have the same point in `_shared_points`, the vector between them is exactly zero. Solvers
-    use this zero vector to detect that the axes intersect.
+    The first vector begins at the base, and the last vector ends at the tip. If two consecutive axes have the
+    same point in `_shared_points`, the vector between the axes is exactly zero. Solvers use this zero vector
+    to detect that the axes intersect.
     """
     points = np.vstack([np.zeros(3), _shared_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
@@ -410,8 +411,8 @@ def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatAr
 def _shared_points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
-    If an axis has several intersections, an intersection of three axes has priority over one of two axes.
-    Among intersections of equally many axes, the one closest to the tip has priority.
+    If an axis has several intersections, an intersection of three axes has priority over an intersection of
+    two axes. Among intersections of the same number of axes, the last intersection on the path has priority.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

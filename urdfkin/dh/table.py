@@ -247,8 +247,8 @@ class SnapChange:
         angle: Angle (rad) of this rotation.
         lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
             zero.
-        prismatic_joints: Prismatic joints between the centre and the tip; their travel increases the
-        distance.
+        prismatic_joints: Prismatic joints between the rotation's centre and the tip. The travel of these
+            joints increases the distance.
     """
 
     row: int
@@ -268,7 +268,7 @@ class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
     Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    its distance from this origin. The sum of these bounds is a bound for all changes together.
+    the distance between the tip and this origin. The sum of these bounds is a bound for all changes together.
 
     Attributes:
         tolerance: The requested tolerance (rad).
@@ -548,7 +548,8 @@ class DHTable(Displayable):
         """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, rad or m, or by name, as a mapping or text.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or the values by name as a mapping
+                or text.
 
         Raises:
             InputError: `q` has the wrong length.

@@ -1,16 +1,17 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame, whose axis z_j is along the axis of the link's own joint. The nearest moving link
-towards the root is the antecedent of link j; i = a(j) is its index. The pose of frame j in frame i is
+link j has one frame, whose axis z_j is along the axis of the link's own joint. The antecedent of link j is
+the nearest moving link towards the root. The antecedent has the index i = a(j). Frame j has this pose in
+frame i:
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The axis x_i is along the common normal between the axes of link i and of its first moving child. Therefore,
 gamma and b of this child are zero. For a chain without branches, the table equals the modified
 Denavit-Hartenberg table; d is then a(i-1), and r is d(i). The angle beta is not part of the original
-notation. It is zero except between nearly parallel axes. Without beta, such axes may need offsets of
-kilometres (Hayati).
+notation. The angle beta is zero unless two axes are nearly parallel. Without beta, nearly parallel axes may
+need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -166,10 +167,9 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
             raise InputError(
-                f"a {joint.kind.value} joint has no single axis and no row",
+                f"a {joint.kind.value} joint has several axes, but a row of the table has one axis",
                 where=f"joint {joint.name}",
-                remedy="load the robot without root_joint, or derive tables of the paths on either side"
-                " of this joint",
+                remedy="load the robot without root_joint, or derive tables of paths without this joint",
             )
     lengths = _path_lengths(tree)
     links = _find_link_axes(tree, lengths)

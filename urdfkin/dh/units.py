@@ -77,13 +77,13 @@ class Units:
         return self._format_number(metres if self.lengths is LengthUnit.METRES else metres * 1000.0)
 
     def round_angle(self, radians: float) -> float:
-        """Return the angle (rad) that a reader of the printed angle gets."""
+        """Return the value (rad) of the printed angle."""
         text = self.format_angle(radians)
         number = parse_number(text, "printed")
         return number if "pi" in text else convert_to_si("theta", number, self)
 
     def round_length(self, metres: float) -> float:
-        """Return the length (m) that a reader of the printed length gets."""
+        """Return the value (m) of the printed length."""
         return convert_to_si("d", parse_number(self.format_length(metres), "printed"), self)
 
     def _format_number(self, value: float) -> str:
@@ -256,7 +256,7 @@ def parse_cell(original: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """A term of the sum in a cell; `operator` is * or / if the last token was this operator."""
+    """A term of the sum in a cell. `operator` is "*" or "/" after this operator, otherwise ""."""
 
     sign: float = 1.0
     size: float | None = None

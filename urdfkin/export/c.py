@@ -44,7 +44,7 @@ def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
 
 
 def fill_template(name: str, /, **texts: str | int) -> str:
-    """Return a template in which `texts[name]` replaces each placeholder `@name@`."""
+    """Read a template, and replace each placeholder `@name@` by `texts[name]`."""
     template = (_TEMPLATES / name).read_text(encoding="utf-8")
     return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 
@@ -150,7 +150,10 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 
 
 class InputLayout:
-    """Order of the array `in`: inputs that are no angles, input angles, computed angles, sines, cosines."""
+    """The order of the numbers in the array `in` of the C code.
+
+    Inputs that are not angles come first. Inputs that are angles, computed angles, sines and cosines follow.
+    """
 
     def __init__(self, function: Function) -> None:
         inputs = [node for node in function.nodes if node.op in function.inputs]
@@ -245,7 +248,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main_program(code: FrameCode, *templates: str) -> str:
-    """Return a program that runs the test vectors; `templates` are templates such as "check_one.c"."""
+    """Return a program that runs the test vectors. `templates` are file names, for example "check_one.c"."""
     checks = (_check(code, function, template) for function in code.functions for template in templates)
     return fill_template("check.c", checks="".join(checks))
 

@@ -1,11 +1,11 @@
-"""Check an exported file: its seal, and its test vectors, which run after the file is compiled or imported.
+"""Check the seal of an exported file, compile or import the file, and run the file's test vectors.
 
 The seal is the digest of the text, in the file's header. The seal shows whether the header, the code or the
 test vectors of the file were changed. A seal is not a signature, so it does not prove who wrote the file.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
-that person's programs. The check runs a copy of the file in a separate folder, so that the copy cannot import
-other files of the original folder, such as a `math.py`, by accident.
+that person's programs. The check runs a copy of the file in a separate folder. In the original folder, the
+file could import another file by accident, for example a `math.py`.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ class FileCheck:
 def check(file: Path) -> FileCheck:
     """Compile or import an exported file, and run the test vectors in the file.
 
-    Raise InputError if the file is not an export or does not run here, and SourceError if it cannot be read.
+    Raise InputError if the file is not an exported file, or if the file cannot run on this computer. Raise
+    SourceError if the file cannot be read.
     """
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:

@@ -1,4 +1,4 @@
-"""The functions of one frame that are exported, and the text of their expressions."""
+"""Collect the exported functions of one frame, and write the functions' expressions as text."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class FrameCode:
             "Units are metres, radians and seconds. Results are written row by row.",
             "Six-vectors and the rows of a Jacobian are [linear; angular] in the reference frame",
             f"{self.reference.name}. Accelerations are classical, without gravity.",
-            "Numbers such as 7.130 are equations of the textbook: urdfkin explain 7.130",
+            "Numbers such as 7.130 are equations of the textbook. To read one: urdfkin explain 7.130",
             "",
             *(f"q[{i}] {name}" for i, name in enumerate(self.coordinates)),
         ]

@@ -1,8 +1,8 @@
 """Compile the kinematics of one frame to machine code, the fastest way to compute in urdfkin.
 
-The first call of a quantity exports C code, compiles the code with the system's compiler, and compares the
-results of the machine code with Pinocchio. Without a C compiler, the forward recursion that Numba compiles is
-used.
+The first call of a quantity exports C code, and compiles the code with the system's compiler. The first call
+also compares the results of the machine code with Pinocchio. Without a C compiler, urdfkin uses the forward
+recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key in the cache consists of the C code, the compiler and
 the processor. The code is loaded from memory, because another program could change a file after the test of
@@ -56,10 +56,11 @@ class NoCompilerError(Exception):
 
 
 def load_library(code: FrameCode) -> ctypes.CDLL:
-    """Compile code that consists of one function, and load it, or raise NoCompilerError.
+    """Compile code that consists of one function, and load the library.
 
-    The argument of the library's entry point `task` is an array with the fields of `KernelArgs`. The result
-    is 0, or 1 if an input is not finite.
+    The library's function `task` has one argument, an array with the fields of `KernelArgs`. The function
+    returns 1 if an input is not finite, and 0 otherwise. Raise NoCompilerError if there is no C compiler, or
+    if the compiler rejects the code.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
@@ -348,7 +349,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # Later calls do not warn, to stay fast.
+            warn_of_degrees(self._tree, q)  # Later calls do not warn, because the check takes time.
         return found
 
     def _machine_code(self, row: Quantity) -> Any:

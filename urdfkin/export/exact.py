@@ -1,8 +1,8 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are the URDF's decimals as fractions. An angle becomes a multiple of pi/12 if both have the same
-nearest double: 1.5707963267948966 becomes pi/2. Irrational square roots, sines and cosines remain
-expressions.
+The constants are the URDF's decimals as fractions. An angle and a multiple of pi/12 may have the same nearest
+double. Then the multiple replaces the angle: 1.5707963267948966 becomes pi/2. Irrational square roots, sines
+and cosines remain expressions.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 class ExactProof(Proof):
     """The checks of an exported file with exact constants.
 
-    `angle_count` is the number of different angles that multiples of pi replace in the code.
+    `angle_count` is the number of different angles that were replaced by multiples of pi.
     `max_angle_change` is the largest difference (rad) between an angle and the multiple of pi that replaces
     it.
     """
@@ -195,7 +195,10 @@ def make_exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Return functions with exact constants, compared with Pinocchio; `proof` contains the test vectors."""
+    """Make functions with exact constants, and compare the functions with Pinocchio.
+
+    Return the functions, and a proof with the test vectors of `proof`.
+    """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:

@@ -138,7 +138,7 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a copy of an equation that stores the equation's number in each node that a call creates.
+        """Return a function that calls an equation, and stores the equation's number in each new node.
 
         If one equation calls another equation, the nodes store the number of the calling equation.
         """

@@ -1,9 +1,9 @@
-"""A function of the exported code, which computes one quantity of one frame, and bounds on its errors.
+"""Make a function of the exported code, and bound the rounding errors of the function.
 
-The exported code assigns each expression that occurs more than once to a variable. Sines, cosines, square
-roots and quotients are also assigned to variables, and so are the numbers of a link's state (pose, velocity,
-acceleration). A long expression is split into several assignments. All other expressions are parts of
-larger expressions.
+Each function computes one quantity of one frame. The exported code assigns each expression that occurs more
+than once to a variable. Sines, cosines, square roots and quotients are assigned to variables. The numbers of
+a link's state (pose, velocity, acceleration) are assigned to variables. A long expression is split into
+several assignments. All other expressions are parts of larger expressions.
 
 `single_bounds` bounds the rounding errors of a function in single precision. Each operation and each constant
 of the code has a rounding error, which `urdfkin.kinematics.roundings` derives. To first order in eps, the
@@ -224,7 +224,7 @@ def _bounds_of_results(
     def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
         """Add `slope` to the derivatives of the results with respect to the expression x.
 
-        If x is a constant, add the error that its rounding causes to the bounds.
+        If x is a constant, increase the bounds by the error due to the rounding of x.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)

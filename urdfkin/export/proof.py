@@ -1,9 +1,10 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The test vectors check the file, and also the user's compiler, language version and libraries. A test vector
-contains inputs and true values at fifty digits. The true values are computed from the URDF's decimals. Each
-true value has a bound on the rounding errors of a correct computation, in eps of the file's precision. The
-inputs are single-precision numbers, so they are equal in single and in double precision.
+contains inputs and true values at fifty digits. The true values are computed from the URDF's decimals. For
+each true value, the file has a bound on the rounding errors of a correct computation. The unit of the bound
+is eps: 2^-52 in double precision, and 2^-23 in single precision. The inputs are single-precision numbers, so
+they are equal in single and in double precision.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations that are compared with Pinocchio.
-#: The neutral configuration and the joint limits are compared too.
+#: The results for this number of random configurations are compared with Pinocchio's results.
+#: The comparison also covers the neutral configuration and the joint limits.
 PROOF_SAMPLES = 100
 VECTOR_COUNT = 4
 
@@ -113,7 +114,7 @@ class Proof:
             f"{name} {k:.3g}" for name, k in self.single_precision_bounds.items() if name not in beyond
         )
         lines = [
-            "Error bounds in single precision, with the rounding of constants, in eps*scale (eps = 2^-23):",
+            "Error bounds in single precision, with rounded constants; unit eps*scale, eps = 2^-23:",
             f"  {bounds}",
         ]
         return [
@@ -157,7 +158,8 @@ def compare_with_pinocchio(
 
     Raise VerificationError if a difference exceeds the error bound.
     """
-    checker = copy(verifier)  # The user's certificate does not count the checks of a copy.
+    # A copy of the verifier counts the checks, so that the user's certificate does not count these checks.
+    checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (samples.q, samples.v, samples.a)[: len(function.inputs)]

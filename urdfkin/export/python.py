@@ -1,6 +1,6 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries; a `Dialect` describes the code around them.
+The expressions are the same for all libraries. A `Dialect` describes all other code for one library.
 """
 
 from __future__ import annotations
@@ -26,9 +26,11 @@ class Dialect:
 
     Attributes:
         result: Function that yields the lines of code that return the results.
-        imports: Import lines. The names of the functions that the code uses replace `{}`. Possible names are
-            `cos`, `sin` and `sqrt`. A line with `{}` is left out if the code uses none of these functions.
-        values: Body of the exported function `_values`, which evaluates a function for some configurations.
+        imports: Import lines. `{}` is a placeholder for the names of the functions that the code uses.
+            Possible names are `cos`, `sin` and `sqrt`. A line with `{}` is left out if the code uses none of
+            these functions.
+        values: Body of the exported function `_values`. This function returns the results of another function
+            for several configurations.
         index: Pattern for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported function `check`, with its default; "" for none.
     """
@@ -53,7 +55,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`; its code assigns each number to an element of an array."""
+    """Return a function for `Dialect.result`. The exported code assigns each number to an array element."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -66,7 +68,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`; its code returns a matrix.
+    """Return a function for `Dialect.result`. The exported code returns a matrix.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -114,7 +116,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Return a function for `Dialect.first_lines`; its code checks the input lengths of one configuration."""
+    """Return a function for `Dialect.first_lines`. The exported code checks the lengths of the inputs."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -132,7 +134,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`; its code stacks numbers, because arrays are immutable."""
+    """Return a function for `Dialect.result`. The exported code stacks numbers to make an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -190,7 +192,7 @@ def _make_check(
 
 _STACKED = '''
 def _stacked({given}values, zero, shape):
-    """Stack numbers, whose batch shapes broadcast to that of `zero`, as an array (..., *shape)."""
+    """Return an array (..., *shape) of the numbers `values`. The batch shape is the shape of `zero`."""
     batch = tuple(zero.shape)
     values = [{xp}.broadcast_to(x, batch) for x in values]
     return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
@@ -247,14 +249,15 @@ def _rotation_bound(plan: CompiledTree) -> float:
     """Return a bound on the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
 
     Several revolute joints can depend on the same coordinate by mimic rules. For each coordinate, the
-    function adds the absolute values of these joints' multipliers. The bound is the largest sum, and at
-    least 1.
+    function adds the absolute values of these joints' multipliers. The bound is the largest sum, or 1 if
+    the largest sum is below 1.
 
     With a floating joint, the bound is at least 3. If one component of a unit quaternion changes by t, the
-    body rotates about a fixed axis. The quaternion and the axis of the changed component are vectors with
-    four components. Let x be the angle between these two vectors. At t = 0, the first three derivatives of
-    the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. A product of F rotated unit
-    vectors has a third derivative of at most (2 F)^3 + 3 (2 F)(2 F) + 4 F. This number is at most (3 F)^3.
+    body rotates about a fixed axis. The quaternion is a vector in four dimensions. The changed component
+    belongs to one of the four coordinate axes. Let x be the angle between the quaternion and this coordinate
+    axis. At t = 0, the first three derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x
+    and 4 sin 3x. A product of F rotated unit vectors has a third derivative of at most
+    (2 F)^3 + 3 (2 F)(2 F) + 4 F. This number is at most (3 F)^3.
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
@@ -322,7 +325,7 @@ DIALECTS = {
     "jax": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
         "broadcast. The functions support jit, vmap and grad.\n"
-        "XLA's fusion pass takes minutes to compile long chains; this line disables the pass:\n"
+        "For long chains, XLA's fusion pass takes minutes. This line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_make_check("not jnp.issubdtype(x.dtype, jnp.floating)")

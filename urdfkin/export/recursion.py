@@ -1,12 +1,12 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-At each joint, the recursion translates along the rigid link, applies a constant rotation, and then applies
-the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
-frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
-joint axes are (0, 0, 1) and link vectors are constant. For LOCAL_WORLD_ALIGNED, the rotations of the path
-are then applied to the result, one after another. This needs a third fewer operations than the computation of
-the frame's rotation matrix R. For the reference WORLD, velocities and accelerations are computed in the axes
-of the world frame.
+At each joint, the recursion translates along the rigid link and applies a constant rotation. Then the
+recursion applies the motion of the joint about or along z. Placements and Jacobians are computed in the axes
+of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's
+frame, where joint axes are (0, 0, 1) and link vectors are constant. For LOCAL_WORLD_ALIGNED, the rotations of
+the path are then applied to the result, one after another. These rotations need a third fewer operations than
+the computation of the frame's rotation matrix R. For the reference WORLD, velocities and accelerations are
+computed in the axes of the world frame.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _Z: Vector = (0, 0, 1)
 
 @dataclass(frozen=True)
 class NumberKind:
-    """Functions that compute with one type of number, and callbacks of the recursion.
+    """The functions for one type of number, and two functions that the recursion calls at each step.
 
     `chapter` contains the textbook's equations. `begin_step` is called before each joint, before the final
     frame and before the results. `end_step` is called after each joint and after the final frame. The integer
-    argument of both callbacks is the index of the step; the first joint has the index 0.
+    argument of `begin_step` and `end_step` is the index of the step. The first joint has the index 0.
     """
 
     chapter: Any
@@ -42,9 +42,9 @@ class NumberKind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path; `end` is the state of the frame.
 
-    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. Otherwise, it
-    is computed in the axes of the world frame. An input that is not needed consists of zeros. `turns` are
-    rotation matrices from the axes of each frame to the axes of the previous frame.
+    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. If `own_axes`
+    is False, the motion is computed in the axes of the world frame. An input that is not needed consists of
+    zeros. `turns` are rotation matrices from the axes of each frame to the axes of the previous frame.
     """
 
     def __init__(
@@ -168,7 +168,11 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the numbers of the Hessian (the terms of 7.126 before their sum), row by row."""
+    """Return the numbers of the Hessian, row by row.
+
+    The Hessian contains the derivative of each Jacobian column with respect to each coordinate. The sum
+    of these derivatives times the joint velocities is the Jacobian's time derivative (7.126).
+    """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):

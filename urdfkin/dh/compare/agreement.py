@@ -41,11 +41,12 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported only if their correction reduces the tip error to this fraction.
-#: A tip error of at most `NEGLIGIBLE_ERROR` also suffices.
+#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
+#: Differing cells are also reported if the remaining tip error is at most `NEGLIGIBLE_ERROR` times the reach.
 _CORRECTED_FRACTION = 0.5
-#: If a table does not agree, the correction of a mistake must reduce the tip error to this fraction.
-#: A tip error within the tolerance also suffices.
+#: This fraction applies to a table that does not agree with the URDF.
+#: A mistake is reported if the correction of the mistake reduces the tip error to at most this fraction.
+#: A mistake is also reported if the remaining tip error is within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Suppose that n cells differ without a fit, and m cells differ after a fit.
@@ -67,8 +68,9 @@ def compare(
 ) -> TableComparison:
     """Compare a reference table with a path of a URDF; `tolerance` is the tolerance at the tip (metres).
 
-    The table may have other base and tip frames than the path, if they are fixed to the same links. If `fit`
-    is true, base, tool, joint offsets and joint signs are fitted before the comparison.
+    The table's base and tip frames may differ from the path's frames. The table's frames must then be fixed
+    to the path's base link and tip link. If `fit` is true, base, tool, joint offsets and joint signs are
+    fitted before the comparison.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -133,7 +135,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
+    """Return the robot's reach (metres). Angles times the reach are compared with lengths.
 
     A table without Hayati rows may have offsets of kilometres. The path length of a URDF that was made from
     this table is then far larger than the reach.
@@ -201,13 +203,19 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of standard row i; None if no row does."""
+    """Return the index of the reference row that contains a cell of standard row i.
+
+    Return None if no row of the reference contains the cell.
+    """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return an (n, 5) mask of cells in standard rows: 1 if the reference contains the cell, else 0."""
+    """Return an (n, 5) array with a number for each cell of the standard rows.
+
+    The number is 1 if the reference table contains the cell, and 0 otherwise.
+    """
     rows = range(len(reference.rows))
     return np.array(
         [[float(_reference_row_index(reference, i, cell) is not None) for cell in CELLS] for i in rows]

@@ -1,13 +1,14 @@
 """Fit a reference table to the URDF: first the table's free parameters, then as few cells as possible.
 
 The free parameters are base, tool and joint offsets. The tip's error at each sampled configuration is a
-twist. A small change of any number in the table also moves the tip by a twist, so least squares find the
-changes that remove the error. If changes of different cells can remove the same error, reweighted least
+twist. A small change of a number in the table moves the tip by another twist. Least squares find the changes
+whose twists remove the error. If changes of different cells can remove the same error, reweighted least
 squares change as few cells as possible.
 
-Suppose that the axes of two joints nearly coincide. An angle that is added to one joint offset and subtracted
-from the other offset then hardly moves the tip. Therefore, a fit changes such offsets slowly. When the error
-no longer decreases, `fit_free_parameters` changes two such offsets by a large angle, and fits again.
+Suppose that the axes of two joints nearly coincide. If an angle is added to one joint offset and subtracted
+from the other joint offset, the tip hardly moves. Therefore, a fit changes these two joint offsets slowly.
+When the error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive joints by a
+large angle, and fits again.
 """
 
 from __future__ import annotations
@@ -50,20 +51,21 @@ _MIN_WEIGHT = 1e-9
 #: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
 #: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_WEIGHT = 1.2
-#: Initial weight of each beta, and the factor that multiplies the weights of beta at each reweighting.
-#: Both numbers are small, so that beta changes only if a change of alpha is not enough.
+#: The first number is the initial weight of each cell beta.
+#: At each reweighting, the weights of the cells beta are multiplied by the second number.
+#: Both numbers are below 1, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
 #: The fit tries large changes of joint offsets only if the mean error exceeds this fraction of the reach.
 _ROUNDING = 1e-13
-#: Tip error, relative to the reach, below which no other joint signs are tried.
+#: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _TIP_ROUNDING = 1e-12
-#: A fit with other joint signs is used only if its tip error is below this fraction of the best so far.
+#: A fit with other joint signs must reduce the smallest tip error so far to less than this fraction.
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: Arguments `count` and `beam_width` of `find_sign_fits` in a fast fit.
+#: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
 
 
@@ -111,8 +113,9 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the amounts (s, 5 n) of its elementary motions (rad or m).
+        """Return the path from base to tip, and the angles (rad) and lengths (m) of the path's motions.
 
+        The array of angles and lengths has the shape (s, 5 n).
         `values` (s, n) contains the joint values of s samples.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
@@ -151,10 +154,11 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and their derivatives (twists) by the free parameters and the table's cells.
+    """Return the tip's poses, and the poses' derivatives with respect to free parameters and cells.
 
-    The derivatives have the shapes (6 s, 12 + n) and (6 s, 5 n). The free parameters have 6 columns for the
-    base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.
+    The derivatives are twists, in two arrays with the shapes (6 s, 12 + n) and (6 s, 5 n). The free
+    parameters have 6 columns for the base, 6 for the tool, and 1 for each joint offset. Angles are multiplied
+    by the scale.
     """
     scale = targets.scale
     path, amounts = model.path_and_amounts(targets.values)
@@ -206,7 +210,11 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
-    """Fit the table by changes of as few cells as possible; `mask` (n, 5) is 1 for cells that may change."""
+    """Fit the table to the targets, and change as few cells as possible.
+
+    `mask` (n, 5) is 1 for the cells that may change, and 0 for all other cells. If `free` is true, the free
+    parameters are fitted too.
+    """
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
         poses, by_free, by_cells = tip_derivatives(model, targets)
@@ -234,7 +242,7 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of the cells that remove the error.
+    """Return changes of the cells. The changes remove the tip error.
 
     After these changes, as few cells as possible differ from `start`. If the free parameters can move the tip
     in the same way as a cell, the cell does not change. For example, a fitted joint offset moves the tip in
@@ -262,7 +270,10 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
 
 
 def find_hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of each cell whose effect on the tip can be reproduced by free parameters."""
+    """Return (row, cell index) of each hidden cell.
+
+    The free parameters can move the tip in the same way as a hidden cell.
+    """
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)

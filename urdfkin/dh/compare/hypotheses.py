@@ -2,9 +2,9 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if its shape is closer
-to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation. The
-function fits at most three interpretations.
+`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if the robot's shape is
+closer to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation.
+The function fits at most three interpretations.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Cost of each difference from the file's interpretation, as a fraction of the smallest difference of shapes.
-#: The tolerance is added to this cost.
+#: Each difference from the file's interpretation has the same cost.
+#: The cost is the tolerance, plus this fraction of the smallest shape difference from the URDF.
 _DIFFERENCE_COST = 0.1
 #: The tip error of a better interpretation is at most this fraction of the reach.
-#: It is also at most this fraction of the tip error of the file's interpretation.
-#: A tip error within the tolerance always suffices.
+#: The tip error is also at most this fraction of the tip error of the file's interpretation.
+#: A tip error within the tolerance is always small enough.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
@@ -76,11 +76,11 @@ class BetterInterpretation:
 def find_better_interpretation(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
 ) -> BetterInterpretation | None:
-    """Return the interpretation with which a table agrees with a URDF; None if there is none.
+    """Return the interpretation with which a table agrees with a URDF, or None.
 
     `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
-    is the tip error with the interpretation that the file states. With the returned interpretation, the tip
-    error is at most 5 % of `stated_error` and of the reach, or at most `tolerance` (metres).
+    is the tip error with the interpretation that the file states. The returned interpretation has a tip error
+    of at most `tolerance` (metres), or at most 5 % of `stated_error` and at most 5 % of the reach.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -158,10 +158,11 @@ def find_dh_convention(
 
 
 def path_shape(table: DHTable, scale: float) -> FloatArray:
-    """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
+    """Return the offset, the distance and the angle of each pair of consecutive axes.
 
-    Joint signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices
-    are 0: all lengths next to a prismatic axis, and the offset along the first axis of the path.
+    The angles are multiplied by `scale`. Joint signs, joint offsets, base and tool do not change the result.
+    Numbers that depend on free choices are 0: all lengths next to a prismatic axis, and the offset along the
+    first axis of the path.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -190,7 +191,10 @@ class Interpretation:
     columns: tuple[str, ...] = COLUMNS
 
     def table(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
+        """Return the table in this interpretation, without base and tool.
+
+        Raise InputError if the table is not valid in this interpretation.
+        """
         stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         contents = dict(zip(COLUMNS, self.columns, strict=True))
         rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]
@@ -247,18 +251,19 @@ def find_table_warnings(table: DHTable) -> list[str]:
     lengths = [abs(length) for length in (*columns["a"], *columns["d"])]
     if lengths and max(lengths) > _MAX_LENGTH and all(length > _MIN_LENGTH * 1e3 for length in lengths):
         warnings.append(
-            f"lengths up to {max(lengths):.4g} m look like millimetres:"
-            " if they are millimetres, write lengths = 'millimetres'"
+            f"lengths up to {max(lengths):.4g} m look like numbers in millimetres:"
+            " for a table in millimetres, write lengths = 'millimetres'"
         )
     elif lengths and max(lengths) < _MIN_LENGTH * 2.0:
         warnings.append(
-            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like metres:"
-            " if they are metres, write lengths = 'metres'"
+            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like numbers in metres:"
+            " for a table in metres, write lengths = 'metres'"
         )
     angles = [*columns["alpha"], *columns["theta"]]
     if angles and all(looks_round(math.degrees(angle)) for angle in angles):
         warnings.append(
-            "angles of 1.57 degrees look like radians: if they are radians, write angles = 'radians'"
+            "angles of 1.57 degrees look like numbers in radians:"
+            " for a table in radians, write angles = 'radians'"
         )
     for length, angle in (("a", "alpha"), ("d", "theta")):
         lengths_look_round = len(columns[length]) > 1 and all(map(looks_round, columns[length]))

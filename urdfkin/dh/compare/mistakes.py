@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. With the
-correct sign, the table agrees with the URDF without a fit, or after a fit that changes fewer parameters.
+correct sign, a fit changes fewer parameters than with the wrong sign, or no parameters.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes whose correction needs the smallest fit.
+        """Correct each possible mistake, fit the corrected table, and return the mistakes with the least fit.
 
-        The smallest fit changes the fewest parameters. The result is empty if no correction makes the fit
-        smaller. A table that `agrees` after a fit may be correct and differ from the URDF only in its frames.
-        A correction of such a table is reported only if the corrected table needs no fit, or only a fit of
-        the base, or only a fit of the tool.
+        The least fit changes the fewest parameters. The result is empty if no correction makes the fit
+        smaller. A table that `agrees` after a fit may be correct, and may differ from the URDF only in its
+        frames. A correction of such a table is reported only if at most one end of the corrected table must
+        be fitted. The two ends are base and tool.
         """
         if self._without_fit(reference) is not None:
             return ()
@@ -184,7 +184,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # With two or three rows, the reversal of the order only exchanges the first and the last row.
+    # For two or three rows, the reversed order is the exchange of the first and the last row.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

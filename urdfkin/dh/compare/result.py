@@ -20,10 +20,12 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: Largest tip error (rad, or metres per metre of reach) that counts as zero after a correction of cells.
-#: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
+#: After a correction of cells, a tip error up to this number is treated as zero.
+#: The unit is rad, or metres per metre of reach.
+#: The rounding errors of a fit are far smaller.
+#: The rounding errors of numbers in data sheets are far larger.
 NEGLIGIBLE_ERROR = 1e-9
-#: Lower limit of the tip error (rad, or metres per metre of reach) in `fit_resolution`.
+#: `fit_resolution` replaces a smaller tip error by this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_FACTOR = 1.0 + 1e-6
@@ -104,9 +106,11 @@ class FitChanges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake in a table; after the mistake is corrected, a fit changes fewer parameters.
+    """A likely mistake in a table.
 
-    `table`, `fit_changes` and the tip errors `metres` and `radians` are those after the correction.
+    `table` is the corrected table. `fit_changes` describes the fit of the corrected table. `metres` and
+    `radians` are the tip errors after this fit. The corrected table needs a fit of fewer parameters than the
+    table with the mistake.
     """
 
     kind: MistakeKind
@@ -133,10 +137,10 @@ class TableComparison:
             angles, and for all displacements within limits. A prismatic joint without limits is assumed to be
             within 10 m of zero. The bounds do not include rounding errors.
         unfitted_metres, unfitted_radians: Largest errors of the unfitted table's tip on the samples.
-        unfitted_differences: The cells that must change so that the table agrees without a fit. Empty if
-            these cells outnumber the cells in `differences` by more than two, or if a tip error remains after
-            a correction of these cells. Also empty for a table with mistakes, and for a comparison without a
-            fit.
+        unfitted_differences: The cells that must change so that the table agrees without a fit. The tuple is
+            empty for a table with mistakes, and for a comparison without a fit. The tuple is also empty if a
+            tip error remains after a correction of these cells. If these cells outnumber the cells in
+            `differences` by more than two, the tuple is empty.
         hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
             offsets.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
@@ -180,7 +184,7 @@ class TableComparison:
 
     @property
     def rounding_metres(self) -> float:
-        """Largest distance (m) between two tips that rounding errors can cause.
+        """Largest distance (m) between the table's tip and the URDF's tip due to rounding errors.
 
         The displacements of prismatic joints contribute to the rounding errors.
         """
@@ -218,9 +222,9 @@ class TableComparison:
 def has_range(limit: Limit | None) -> bool:
     """Return whether a prismatic joint's limits are finite and allow more than one value.
 
-    A comparison ignores equal limits, and moves the joint. If the joint did not move, the samples would not
-    depend on the direction of the joint's axis. The default of both limits is 0, so a URDF may omit the
-    limits.
+    If the two limits of a joint are equal, a comparison ignores the limits and moves the joint. If the joint
+    did not move, the samples would not depend on the direction of the joint's axis. The default of both
+    limits is 0, so a URDF may omit the limits.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
@@ -396,7 +400,7 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     if {(one.row, one.cell) for one in comparison.unfitted_differences} - {
         (one.row, one.cell) for one in comparison.differences
     }:
-        parts += ["", f"To agree without a fit, these cells must change {unit}:"]
+        parts += ["", f"The table agrees without a fit if these cells change {unit}:"]
         parts.append(_difference_table(comparison.unfitted_differences, units))
     return parts
 

@@ -45,9 +45,10 @@ class SignFit:
     """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
 
     Attributes:
-        senses: Sign of each joint. With -1, the reference's variable decreases if the URDF's joint value
-            increases.
-        offsets: Number that is added to theta of each row in the reference (to d for a prismatic joint).
+        senses: Sign of each joint. If the sign is -1, the reference's variable decreases while the URDF's
+            joint value increases.
+        offsets: Joint offset of each row (rad or m). The joint offset is added to theta of the reference's
+            row, or to d if the joint is prismatic.
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the reference's last frame.
     """
@@ -69,7 +70,7 @@ class _PartialAlignment:
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         delta_in: Offset along z from the last joint's DH frame to its URDF frame (metres).
         free_offset: Row index and sign of a joint offset that can be chosen freely, because the direction of
-            x is free. The sign is +1 or -1: the direction in which this joint offset rotates x.
+            x is free. The sign (+1 or -1) is the direction in which x rotates if the joint offset increases.
     """
 
     cost: float
@@ -101,7 +102,7 @@ def find_sign_fits(
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
     # If axes nearly coincide, many directions of x are nearly equivalent.
-    # A fit that starts with one of these directions of x can reach each of the other directions.
+    # One start value is enough for all these directions, because the fit can rotate x.
     # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:

@@ -55,7 +55,10 @@ def format_variable(
 
 
 def format_coordinate_names(table: DHTable) -> str:
-    """Return text such as "with q1 = left, q2 = right" if rows and coordinates differ."""
+    """Return the names of the coordinates as text, such as "with q1 = left, q2 = right".
+
+    The text is empty if the coordinates are the joints of the rows, in the same order.
+    """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
@@ -270,7 +273,8 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
-    # DHTable rejects coarsely rounded rotations, so the printed base and tool are multiplied separately.
+    # `DHTable` rejects a base or a tool whose rotation is rounded to few digits.
+    # Therefore, the matrices of the printed base and tool are multiplied outside the table.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
@@ -312,7 +316,7 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
 
 
 def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
+    """Return a bound (m) of the tip's position error due to the rounding of all numbers in a printed table.
 
     The rounding error of an angle moves the tip by at most this error times `lever`. The length `lever` is an
     upper bound of the distance from the row's frame to the tip.

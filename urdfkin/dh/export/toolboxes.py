@@ -161,8 +161,8 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
 
 
 def _numpy(screws: ProductOfExponentials) -> str:
-    title = f"{sanitize(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."
-    lines = [f'"""{title}"""']
+    title = f"{sanitize(screws.robot)}: zero pose M, space screws Slist and body screws Blist, in metres."
+    lines = [f'"""{title}', "", "Each screw is a column (w, v), as in Modern Robotics.", '"""']
     lines += ["", "import numpy as np", ""]
     for name, rows in (("M", screws.M), ("Slist", screws.space), ("Blist", screws.body)):
         lines += _array(name, rows, ")" if name == "M" else ").reshape(-1, 6).T")
@@ -191,7 +191,7 @@ def _array(name: str, rows: FloatArray, end: str) -> list[str]:
 
 def _matlab(screws: ProductOfExponentials) -> str:
     lines = [f"function [M, Slist, Blist] = {make_identifier(screws.robot)}_screws()"]
-    lines += [f"% {sanitize(screws.robot)}: screws are columns (w; v), metres, as in Modern Robotics"]
+    lines += [f"% {sanitize(screws.robot)}: each screw is a column (w; v), in metres, as in Modern Robotics"]
     lines += matrix_lines("M", screws.M, 4)
     for name, rows in (("Slist", screws.space), ("Blist", screws.body)):
         lines += [*matrix_lines(name, rows, 6), f"{name} = {name}';"]
