@@ -100,6 +100,25 @@ def test_a_reference_table_of_a_different_robot_is_refused() -> None:
         make_dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"last": "flange"},
+        {"parallel_offset": "first"},
+        {"parallel_offset": "each"},
+        {"first": "joint"},
+        {"sign": "a"},
+        {"flip": ["j2"]},
+    ],
+)
+def test_an_option_that_the_published_table_determines_is_refused(options: dict[str, Any]) -> None:
+    tree = elbow()
+    reference = make_dh_table(tree, "tip")
+    (name,) = options
+    with pytest.raises(InputError, match=f"`{name}` and `like` exclude each other"):
+        make_dh_table(tree, "tip", like=reference, **options)
+
+
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_the_option_sign_makes_a_or_alpha_nonnegative(convention: str) -> None:
     inner = slice(0, 5) if convention == "standard" else slice(1, 6)

@@ -154,7 +154,7 @@ form_options = combine(
 )
 
 
-#: Options that have no effect with --like
+#: Options that the published table of --like determines.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
 #: If ROBOT is a Denavit-Hartenberg table, the command derives a new table only with one of these options.

@@ -30,6 +30,8 @@ _MAX_DIFFERENCE = 0.1
 _ZERO_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
+#: Options that the published table of `like` determines.
+_SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
@@ -144,13 +146,13 @@ def make_dh_table(
             a between the two axes is then 0.
         like: A published table. The result has the published table's positive joint directions and
             directions of x. The result also has the published offsets along parallel axes, and the published
-            zero positions of the first and the last joint. All other numbers come from the URDF. With `like`,
-            the arguments `flip` and `sign` are ignored. The arguments `first`, `last` and `parallel_offset`
-            must keep their default values, because "joint", "flange" and "first" change the published frames.
+            zero positions of the first and the last joint. All other numbers come from the URDF.
+            With `like`, `last`, `parallel_offset`, `flip`, `first` and `sign` must have their default values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option has an invalid value, or the path contains a planar or floating joint.
+        InputError: an option has an invalid value, an option excludes `like`, or the path contains a planar
+            or floating joint.
         RangeError: the square of a length is outside the range of doubles.
     """
     exact = make_chain(tree, tip, base)
@@ -172,6 +174,13 @@ def make_dh_table(
         slide,
     )
     if like is not None:
+        for name in _SET_BY_LIKE:
+            if (value := getattr(options, name)) != getattr(DerivationOptions(), name):
+                raise InputError(
+                    f"`{name}` and `like` exclude each other: the published table determines the frames",
+                    found=f"{name}={value!r}",
+                    remedy=f"leave out `{name}` or `like`",
+                )
         options = replace(options, flip=find_reversed_joints(exact, options, like))
 
     def make_table(path: FrameChain) -> DHTable:

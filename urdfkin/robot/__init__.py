@@ -1485,12 +1485,13 @@ class Robot(Displayable):
                 so that a is 0.
             like: A published table. The returned table has the same frames, positive joint directions and
                 zero positions as the published table. With `like`, the arguments `flip`, `first`, `last`,
-                `sign` and `parallel_offset` have no effect.
+                `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
             UnknownNameError: a frame or a joint does not exist.
-            InputError: an option has an invalid value, or the path contains a planar or floating joint.
+            InputError: an option has an invalid value, an option excludes `like`, or the path contains a
+                planar or floating joint.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:
