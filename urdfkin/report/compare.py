@@ -179,10 +179,12 @@ def _cell(value: Units | str) -> str:
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Growth by a smaller factor is normal, because the samples are random.
 GROWTH_FACTOR = 2.0
-#: If a disagreement (in eps * scale) grows to at most this number, the growth is not a regression.
+#: If a disagreement is at most this number after the growth, the growth is not a regression.
+#: The number is in multiples of eps * scale.
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
-#: If the ratio of a disagreement to its bound grows to at most this number, the growth is not a regression.
+#: This number limits the ratio of a disagreement to its bound.
+#: If the ratio is at most this number after the growth, the growth is not a regression.
 _BOUND_RATIO_FLOOR = 0.1
 
 

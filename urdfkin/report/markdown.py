@@ -30,7 +30,10 @@ _SHOWN = 3
 
 
 def as_markdown(document: Document) -> str:
-    """Return the report as a comment, failed robots first; robots that do not fit are only counted."""
+    """Return the report as a comment on a pull request.
+
+    The robots with the worst verdicts come first. Robots that do not fit into the comment are only counted.
+    """
     found = outcome_of(document)
     head = [
         f"## {'✅ Verified against' if found.passed else '❌ Not verified against'} Pinocchio"
@@ -127,7 +130,11 @@ def row_line(cells: Iterable[str]) -> str:
 def table_lines(
     heads: Sequence[str], rows: Iterable[Iterable[str]] = (), left: Collection[int] | None = None
 ) -> list[str]:
-    """Return the lines of a table. Cells must be escaped; `left` are left-aligned columns (default: all)."""
+    """Return the lines of a Markdown table.
+
+    The caller must escape the cells. `left` contains the indices of the left-aligned columns. If `left` is
+    None, all columns are left-aligned.
+    """
     marks = ["---" if left is None or i in left else "---:" for i in range(len(heads))]
     return [row_line(cells) for cells in (heads, marks, *rows)]
 

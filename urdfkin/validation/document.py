@@ -1,6 +1,7 @@
-"""JSON document of a validation: its types, from which the schema is generated, and the outcome.
+"""Types of the JSON document of a validation, and the outcome of a validation run.
 
-Only this module decides whether a run has passed, for new reports and for reports that are read from a file.
+The JSON schema is generated from these types. Only this module decides whether a run has passed, for new
+reports and for reports that are read from a file.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class ReportedMimic(TypedDict):
 class ReportedRange(TypedDict):
     """The part of a joint's range in which all mimic joints of this joint are within their limits.
 
-    Both ends are null if the mimic joints exceed their limits everywhere in the range.
+    Both ends are null if at most one joint value keeps the mimic joints within their limits.
     """
 
     lower: Annotated[float | None, doc("Lower end, rad or m; null: the part is empty.")]
@@ -436,9 +437,9 @@ class RunOutcome:
     """The outcome of a validation run.
 
     Attributes:
-        exit_code: 0 if everything is verified. Otherwise the first code that applies, in this order: 1 (a
-            disagreement), 130 (interrupted), 2 (a robot cannot be read), 3 (a robot was not verified, or
-            there was no robot).
+        exit_code: 0: every robot is verified. 1: a result disagrees. 130: the run was interrupted. 2: a robot
+            cannot be read. 3: a robot was not verified or has no report, or there was no robot. If several
+            codes apply, the first code in this order is used.
     """
 
     exit_code: int
