@@ -239,8 +239,8 @@ class ChangeEntry(TypedDict):
 
     robot: Annotated[str | None, doc("Source of the robot; null if the value does not belong to one robot.")]
     what: Annotated[str, doc("Name of the changed value.")]
-    old: Annotated[str, doc("Value in the old report; empty if the old report has none.")]
-    new: Annotated[str, doc("Value in the new report; empty if the new report has none.")]
+    old: Annotated[str, doc("Value in the old report; empty if the old report has no value.")]
+    new: Annotated[str, doc("Value in the new report; empty if the new report has no value.")]
     regression: Annotated[bool, doc("Whether the change is a regression.")]
 
 

@@ -77,7 +77,7 @@ class Point(TypedDict):
     source: Annotated[str, doc("The robot's source in this run.")]
     verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], doc("The verdict.")]
     reason: Annotated[str | None, doc("Reason why the robot is not verified; null if it is verified.")]
-    sha256: Annotated[Sha256 | None, doc("Digest of the robot's text; null if it could not be read.")]
+    sha256: Annotated[Sha256 | None, doc("SHA-256 of the robot's text; null: the robot could not be read.")]
     samples: Annotated[Count, doc("Number of compared configurations.")]
     results: Annotated[Count, doc("Number of compared results.")]
     failed: Annotated[Count, doc("Number of results outside their bound.")]

@@ -118,11 +118,13 @@ def _remaining_range(joint: ReportedJoint) -> str:
         return ""
     if remaining["lower"] is None or remaining["upper"] is None:
         names = ", ".join(remaining["by"])
-        return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
+        return f"{joint['name']}: at most one value keeps the mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{format_range((remaining['lower'], remaining['upper']))} {unit}"
     mimics = ", ".join(remaining["by"])
-    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({mimics})."
+    return (
+        f"{joint['name']}: the mimic joints are within their limits only for values from {ends} ({mimics})."
+    )
 
 
 def _coordinate(joint: ReportedJoint) -> str:

@@ -83,7 +83,7 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 def _within(sameness: Sameness, most: float) -> str:
-    limit = f"WITHIN {most:g} m and rad without changes of B: "
+    limit = f"WITHIN {most:g} m and rad, without changes of model B: "
     if sameness.within(most):
         return f"{limit}no frame is ever off by more than {_both(*sameness.bound_as_written)}"
     if (

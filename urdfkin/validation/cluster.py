@@ -155,7 +155,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
                     raise ClusterError(
                         "this version of Dask opens a port for local workers",
                         found=str(server.address),
-                        remedy="use --jobs, or install another version of the package distributed",
+                        remedy="use --jobs, or install another version of the package `distributed`",
                     )
             try:
                 yield cluster

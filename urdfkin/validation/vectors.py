@@ -89,8 +89,12 @@ class JointEntry(TypedDict):
 
     name: Annotated[str, doc("Name of the joint.")]
     type: Annotated[str, doc("Type of the joint in the URDF.")]
-    q: Annotated[list[Count], of_length(2), doc("First index in q, and the index after the last.")]
-    v: Annotated[list[Count], of_length(2), doc("First index in v and a, and the index after the last.")]
+    q: Annotated[list[Count], of_length(2), doc("Indices [start, stop]: q[start:stop] belongs to the joint.")]
+    v: Annotated[
+        list[Count],
+        of_length(2),
+        doc("Indices [start, stop]: v[start:stop] and a[start:stop] belong to the joint."),
+    ]
 
 
 class Result(TypedDict):
@@ -144,7 +148,10 @@ class Vectors(TypedDict):
     rule: Annotated[str | None, doc("The rule of the URDF standard that this robot tests, or null.")]
     note: Annotated[
         str | None,
-        doc("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
+        doc(
+            "Known difference between libraries, or why the mimic rules of the robot are invalid."
+            " null: no remark."
+        ),
     ]
     joints: list[JointEntry]
     samples: list[Sample]
