@@ -2,14 +2,19 @@
 
 A change is a regression in these cases:
 
-- The run passed before and fails now, or it was interrupted now and not before.
-- A robot is missing, its verdict is worse, or it is new and not verified.
-- More results lie outside their bound, or results of a quantity that was not compared before.
-- A quantity or a table is no longer compared, or there are fewer samples or results.
-- A bound is wider for the same joints.
-- The worst disagreement grew by more than a factor, and is above the error of a single rounding; or it is
-  infinite now.
-- The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
+- The old run passed, and the new run has not passed.
+- The new run was interrupted, and the old run was not.
+- A robot of the old report is missing in the new report.
+- The verdict on a robot is worse.
+- A robot that is only in the new report is not verified.
+- More results lie outside their bound.
+- A quantity that is only in the new report has results outside their bound.
+- A quantity or a table is no longer compared.
+- There are fewer samples or fewer results.
+- A bound is wider, although the robot has the same joints.
+- The worst disagreement grew by more than a given factor, and exceeds the error of a single rounding.
+- The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
+- The worst disagreement or the largest ratio is infinite only in the new report.
 
 A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
 rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
