@@ -240,7 +240,7 @@ def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> 
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, VALIDATION.schema())
     page = as_html(document)
-    assert "leader: its mimic joints are within limits only from -0.005 to 0.005 m (f1)." in page
+    assert "the mimic joints are within their limits only for values from -0.005 to 0.005 m (f1)." in page
     assert "URDF527" in page
 
 

@@ -64,7 +64,7 @@ def test_a_moved_tool_is_equivalent_up_to_tools_and_not_within_a_smaller_distanc
     assert found.within(0.0501)
     assert [found.exit_code(within=most) for most in (None, 1e-6, 0.0501)] == [0, 1, 0]
     asked = headline(a, b, within=1e-6)
-    assert asked.startswith("NOT WITHIN 1e-06 m and rad without changes of B: tcp is 50 mm off")
+    assert asked.startswith("NOT WITHIN 1e-06 m and rad, without changes of model B: tcp is 50 mm off")
 
 
 def test_a_rotated_tool_is_reported_in_radians() -> None:
@@ -148,7 +148,7 @@ def test_intervals_cover_the_files_limits_although_mimic_joints_exceed_limits() 
     found = urdfkin.same(a, b)
     assert present(found.worst).lower == pytest.approx(550e-6, rel=1e-3)
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
-    said = "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
+    said = "NOT WITHIN 0.0001 m and rad, without changes of model B: b is 0.55 mm"
     assert headline(a, b, within=1e-4).startswith(said)
     own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints are within their limits only for values"
     ends = ("A", "0.005"), ("B", "0.0049505")

@@ -2,14 +2,19 @@
 
 A change is a regression in these cases:
 
-- The run passed before and fails now, or it was interrupted now and not before.
-- A robot is missing, its verdict is worse, or it is new and not verified.
-- More results lie outside their bound, or results of a quantity that was not compared before.
-- A quantity or a table is no longer compared, or there are fewer samples or results.
-- A bound is wider for the same joints.
-- The worst disagreement grew by more than a factor, and is above the error of a single rounding; or it is
-  infinite now.
-- The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
+- The old run passed, and the new run has not passed.
+- The new run was interrupted, and the old run was not.
+- A robot of the old report is missing in the new report.
+- The verdict on a robot is worse.
+- A robot that is only in the new report is not verified.
+- More results lie outside their bound.
+- A quantity that is only in the new report has results outside their bound.
+- A quantity or a table is no longer compared.
+- There are fewer samples or fewer results.
+- A bound is wider, although the robot has the same joints.
+- The worst disagreement grew by more than a given factor, and exceeds the error of a single rounding.
+- The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
+- The worst disagreement or the largest ratio is infinite only in the new report.
 
 A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
 rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
@@ -179,10 +184,12 @@ def _cell(value: Units | str) -> str:
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Growth by a smaller factor is normal, because the samples are random.
 GROWTH_FACTOR = 2.0
-#: If a disagreement (in eps * scale) grows to at most this number, the growth is not a regression.
+#: If a disagreement is at most this number after the growth, the growth is not a regression.
+#: The number is in multiples of eps * scale.
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
-#: If the ratio of a disagreement to its bound grows to at most this number, the growth is not a regression.
+#: This number limits the ratio of a disagreement to its bound.
+#: If the ratio is at most this number after the growth, the growth is not a regression.
 _BOUND_RATIO_FLOOR = 0.1
 
 
@@ -237,8 +244,8 @@ class ChangeEntry(TypedDict):
 
     robot: Annotated[str | None, doc("Source of the robot; null if the value does not belong to one robot.")]
     what: Annotated[str, doc("Name of the changed value.")]
-    old: Annotated[str, doc("Value in the old report; empty if the old report has none.")]
-    new: Annotated[str, doc("Value in the new report; empty if the new report has none.")]
+    old: Annotated[str, doc("Value in the old report; empty if the old report has no value.")]
+    new: Annotated[str, doc("Value in the new report; empty if the new report has no value.")]
     regression: Annotated[bool, doc("Whether the change is a regression.")]
 
 

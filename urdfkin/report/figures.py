@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Left end of the x axis, in multiples of eps * scale.
-#: The percentage at the left end is the share of results with smaller disagreements.
+#: The percentage at the left end is the share of results with a disagreement below this value.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82

@@ -1,7 +1,7 @@
 """History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
 Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed.
-Each report is read twice, first for the start time and then for the results, so that few reports are in
+Each report is read twice: first for the start time, and then for the results. Therefore, few reports are in
 memory at the same time.
 """
 
@@ -40,7 +40,9 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 #: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
 #: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
+#: Maximum number of changes on the page.
+#: On a terminal without --all: maximum number of changes, and maximum number of runs.
+#: The latest changes and runs are shown.
 SHOWN = 20
 _MAX_LISTED = 500
 #: Symbol of each verdict; the empty verdict means that the run did not include the robot.
@@ -75,7 +77,7 @@ class Point(TypedDict):
     source: Annotated[str, doc("The robot's source in this run.")]
     verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], doc("The verdict.")]
     reason: Annotated[str | None, doc("Reason why the robot is not verified; null if it is verified.")]
-    sha256: Annotated[Sha256 | None, doc("Digest of the robot's text; null if it could not be read.")]
+    sha256: Annotated[Sha256 | None, doc("SHA-256 of the robot's text; null: the robot could not be read.")]
     samples: Annotated[Count, doc("Number of compared configurations.")]
     results: Annotated[Count, doc("Number of compared results.")]
     failed: Annotated[Count, doc("Number of results outside their bound.")]
@@ -116,14 +118,18 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Each key is the source of a robot, or None for changes of a whole run.
+#: Changes of each robot: each key is the source of a robot.
+#: The value of the key None contains the changes that concern a whole run.
 #: Each value is a list of pairs: the index of a run, and a change.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
 @dataclass(slots=True)
 class History:
-    """The runs and robots of several reports; the keys of `robots` are the latest sources."""
+    """Runs and robots of several reports.
+
+    Each key of `robots` is the source of a robot in the latest run with this robot.
+    """
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)
@@ -246,7 +252,10 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
+    """Return the start time of a run in seconds and as text.
+
+    If the date is invalid, the number of seconds is infinite.
+    """
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     moment = utc(text)
@@ -349,7 +358,7 @@ def document(history: History, *, all_: bool = False) -> TextDocument:
 
 
 def headline(history: History) -> str:
-    """State the latest verdict, and how many runs directly before had the same verdict.
+    """Return the latest verdict, and the number of consecutive earlier runs with the same verdict.
 
     >>> headline(History([{"verdict": v} for v in ("disagrees", "verified", "verified")]))
     '3 runs; latest verdict: verified, as in the run before'

@@ -105,10 +105,11 @@ def as_html(document: Document) -> str:
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the path, relative to the page, and the text of each file; the page is the last file.
+    """Yield the path and the text of each file.
 
-    If all details together are longer than `MOST` characters, each robot has its own file. For the page
-    `report.html`, these files are in the folder `report-robots`.
+    Paths are relative to the page. The page is the last file. If all details together are longer than `MOST`
+    characters, each robot has its own file. For the page `report.html`, these files are in the folder
+    `report-robots`.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"

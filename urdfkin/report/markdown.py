@@ -30,7 +30,10 @@ _SHOWN = 3
 
 
 def as_markdown(document: Document) -> str:
-    """Return the report as a comment, failed robots first; robots that do not fit are only counted."""
+    """Return the report as a comment on a pull request.
+
+    The robots with the worst verdicts come first. Robots that do not fit into the comment are only counted.
+    """
     found = outcome_of(document)
     head = [
         f"## {'✅ Verified against' if found.passed else '❌ Not verified against'} Pinocchio"
@@ -43,8 +46,8 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_cross_check_table(document["robots"]),
-        "The first table has the worst disagreement for each quantity in eps·scale: the difference divided by"
-        " 2^-52 and by the size of the terms in the sum. Rounding errors give 1 to 10.",
+        "The first table has the worst disagreement for each quantity, in multiples of eps·scale. eps is"
+        " 2^-52, and scale is the size of the terms in the sum. Rounding errors give 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",
@@ -127,7 +130,11 @@ def row_line(cells: Iterable[str]) -> str:
 def table_lines(
     heads: Sequence[str], rows: Iterable[Iterable[str]] = (), left: Collection[int] | None = None
 ) -> list[str]:
-    """Return the lines of a table. Cells must be escaped; `left` are left-aligned columns (default: all)."""
+    """Return the lines of a Markdown table.
+
+    The caller must escape the cells. `left` contains the indices of the left-aligned columns. If `left` is
+    None, all columns are left-aligned.
+    """
     marks = ["---" if left is None or i in left else "---:" for i in range(len(heads))]
     return [row_line(cells) for cells in (heads, marks, *rows)]
 

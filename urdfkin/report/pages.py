@@ -118,11 +118,13 @@ def _remaining_range(joint: ReportedJoint) -> str:
         return ""
     if remaining["lower"] is None or remaining["upper"] is None:
         names = ", ".join(remaining["by"])
-        return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
+        return f"{joint['name']}: at most one value keeps the mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{format_range((remaining['lower'], remaining['upper']))} {unit}"
     mimics = ", ".join(remaining["by"])
-    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({mimics})."
+    return (
+        f"{joint['name']}: the mimic joints are within their limits only for values from {ends} ({mimics})."
+    )
 
 
 def _coordinate(joint: ReportedJoint) -> str:
@@ -150,7 +152,7 @@ def _limits(limit: ReportedLimit | None, kind: str) -> dict[str, str]:
 def heat_map(
     robot: ReportedRobot, model: ReportedModel
 ) -> tuple[list[str], list[tuple[str, list[HeatCell]]]]:
-    """Return the column heads, and (name, cells) for each moving joint."""
+    """Return the column headings, and a pair (name, cells) for each moving joint."""
     quantities_of = quantities_by_heading([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
@@ -191,11 +193,11 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
-    """Return an upper limit of the ratio of a disagreement to its error bound.
+    """Return an upper limit of the ratio of disagreement to error bound for a frame, joint or column.
 
-    The disagreement is the largest of one frame, joint or column. The document has no error bound for a
-    single frame, joint or column. This function therefore divides the disagreement by the check's smallest
-    error bound. The result never exceeds the check's largest ratio.
+    The document has no error bound for a single frame, joint or column. Therefore, this function divides the
+    largest disagreement of the frame, joint or column by the check's smallest error bound. The result never
+    exceeds the check's largest ratio.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.
@@ -207,9 +209,10 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return rows of cells: joint, a, alpha, beta if the chain has beta, d, theta.
+    """Return rows with the cells joint, a, alpha, beta, d and theta.
 
-    The cell of the joint variable (theta or d) also contains q.
+    The cell beta is missing if beta is 0 in all rows of both tables of the chain. The cell of the joint
+    variable (theta or d) also contains q.
     """
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]

@@ -1,8 +1,8 @@
 """Read report documents, and check the layout and the consistency of all entries.
 
-A report is used as evidence, but may have been edited or truncated. Entries that follow from other entries
-are computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of
-a robot must form a tree, and the indices of the joints in q and v must be consistent.
+A report is used as evidence, but may have been edited or truncated. Some entries can be computed from other
+entries: the outcome, verdicts, sums, ratios and percentiles. These entries are computed again and compared.
+The links and joints of a robot must form a tree. The indices of the joints in q and v must be consistent.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Check the indices of joints, and how many coordinates and joint velocities a model has.
+    """Check the joints' indices in q and v, and the numbers of coordinates and of joint velocities.
 
     Yield a text for each error. A joint has an index in q and an index in v. A mimic joint has the indices of
     its mimicked joint.

@@ -44,7 +44,8 @@ EQUIVALENT = SameQuestion()
 #: A distance or angle of at most FACTOR times the bound on rounding errors is not printed.
 #: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
-#: Heading for joints that can move a mimic joint beyond the limits of the mimic joint.
+#: Heading of a list of mimicked joints.
+#: Within its range, each of these joints can move a mimic joint beyond the limits of the mimic joint.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -82,7 +83,7 @@ def headline(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 def _within(sameness: Sameness, most: float) -> str:
-    limit = f"WITHIN {most:g} m and rad without changes of B: "
+    limit = f"WITHIN {most:g} m and rad, without changes of model B: "
     if sameness.within(most):
         return f"{limit}no frame is ever off by more than {_both(*sameness.bound_as_written)}"
     if (
@@ -102,7 +103,10 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Describe the largest distance and angle between matching frames, unless they are rounding errors."""
+    """Describe the largest distance and the largest angle between matching frames.
+
+    A distance or angle that rounding errors explain is left out.
+    """
 
     def largest(end: str) -> float:
         return max((getattr(frame, end) for frame in frames), default=0.0)
@@ -122,7 +126,10 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Describe the distance and the angle of two matching frames, unless they are rounding errors."""
+    """Describe the distance and the angle of two matching frames.
+
+    A distance or angle that rounding errors explain is left out.
+    """
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
         parts.append(up_to(angle, frame.radians_seen, frame.radians))
@@ -138,9 +145,9 @@ def far_frames(sameness: Sameness) -> list[Interval]:
 def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The table has the distances after the changes of B. The verdict "same up to single precision" is about the
-    unchanged models. Therefore, the heading lists the changes of B if the models are the same up to single
-    precision.
+    The table contains the distances after model B was changed to match model A. The verdict "same up to
+    single precision" compares the unchanged models. Therefore, if this verdict is given, the heading lists
+    the changes of model B.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -153,10 +160,10 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames of A and the unchanged B.
+    """Describe the largest distance between matching frames of model A and the unchanged model B.
 
-    The text is empty if model B needs no changes to match model A. The text is also empty if rounding errors
-    explain the distance.
+    The text is empty in two cases: model B needs no changes to match model A, or rounding errors explain the
+    distance.
     """
     frame = sameness.as_written
     off = "" if frame is None else _off(frame, sameness.rounding)
@@ -164,10 +171,10 @@ def describe_as_written(sameness: Sameness) -> str:
 
 
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
-    """Describe the configuration at which a lower bound is attained, with units.
+    """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text has the nonzero coordinates of A. It also has the nonzero coordinates of each joint of B that
-    matches no independent joint of A.
+    The text contains the nonzero coordinates of model A. Some joints of model B match no independent joint of
+    model A. The text also contains the nonzero coordinates of these joints.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -289,7 +296,10 @@ def as_document(sameness: Sameness) -> TextDocument:
 
 
 def distance_text(frame: Interval) -> str:
-    """Describe the distance of two frames at the worst configuration, unless the frames coincide."""
+    """Describe the distance of two frames in the worst configuration.
+
+    If the lower bound of the distance is 0, the text is the angle. If the angle is also 0, the text is empty.
+    """
     if frame.lower:
         return length(frame.lower)
     return angle(frame.radians_seen) if frame.radians_seen else ""
@@ -397,9 +407,10 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, the robots are in the zero configuration. With `written`, B is drawn without the changes
-    that make B equivalent to A. A line is given by the x and y of its two ends. Each picture has the lines
-    of A and the lines of B. The enlarged picture also has a line between the two frames.
+    Without `worst`, the robots are in the zero configuration. If `written` is True, model B is drawn as
+    given. Otherwise, model B is drawn after the changes that make model B equivalent to model A. Each line is
+    four numbers: x and y of the start point, and x and y of the end point. Each picture has the lines of A
+    and the lines of B. The enlarged picture also has a line between the two frames.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()

@@ -69,7 +69,7 @@ def format_units(value: Units, *, compared: bool = True) -> str:
 def format_ratio(ratio: Units) -> str:
     """Format the ratio of a disagreement to its bound.
 
-    A ratio below 10 is written as a percentage, another ratio as a factor.
+    A ratio below 10 is written as a percentage. A ratio of 10 or more is written as a factor, such as "12 x".
     """
     if ratio is None:
         return "inf"
@@ -100,7 +100,7 @@ def checks_in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Map each heading of the table of robots to the quantities in the column."""
+    """Return the quantities in each column of the robots' table; the keys are the column headings."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].heading if name in QUANTITIES else name

@@ -167,7 +167,11 @@ class _AccuracyBatch:
         )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Yield analytical Jacobians, except near a singularity or if a quaternion's sign is uncertain."""
+        """Yield the analytical Jacobians of each representation of the orientation.
+
+        Poses near a singularity of Euler angles are skipped. Poses with a quaternion of uncertain sign are
+        skipped.
+        """
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
         size, nearest = (
@@ -200,8 +204,8 @@ class _AccuracyBatch:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return the indices (n, links, m) of the nonzero columns of each link's Jacobian.
 
-    m is the largest number of nonzero columns of a Jacobian. If a Jacobian has fewer nonzero columns, its
-    remaining indices are indices of zero columns.
+    m is the largest number of nonzero columns of a Jacobian. If a Jacobian has fewer than m nonzero columns,
+    the last indices of this Jacobian belong to zero columns.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

@@ -3,9 +3,9 @@
 If an exception occurs while a robot is validated, the answer contains the exception's message. An answer is
 plain data, because some exceptions cannot be sent between processes.
 
-A file contains an answer as compressed JSON, with the key of the chunk and a checksum (sha256). A file may
-come from another machine, so it contains no code. Damaged, truncated, renamed and foreign files are detected
-before their data are used.
+A file contains an answer as compressed JSON, with the key of the chunk and a checksum (sha256). A file
+contains only data and no code, because the file may come from another machine. Damaged, truncated, renamed
+and foreign files are detected before their data are used.
 """
 
 from __future__ import annotations
@@ -31,8 +31,9 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    `is_transient` is True if the process or the cluster failed, and not the robot. Such a failure is not
-    stored, so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
+    If `is_transient` is True, the chunk could not be run or the answer was lost. A transient failure is not
+    stored. Therefore, a resumed run computes the chunk again. `error` is the traceback of an unexpected
+    error.
     """
 
     verdict: ValidationVerdict

@@ -1,4 +1,4 @@
-"""`validate`: split the work into chunks, run them on an engine, and make the report from their answers."""
+"""The function `validate`: split the work into chunks, run the chunks, and make the report."""
 
 from __future__ import annotations
 
@@ -77,7 +77,8 @@ def validate(
         mimic: As in `load`.
         root_joint: As in `load`.
         xacro_args: Arguments for the .xacro files among the robots, as in `load`.
-        lock: Value (rad or m) of each joint to lock in each robot, as in `load`.
+        lock: The joints to lock, each with a value in rad or m, as in `load`. The joints are locked in every
+            robot.
         joints: The joints that remain movable in each robot, as in `load`.
         oracle: "mujoco": also compare every frame with MuJoCo, which needs the extra `mujoco`. If only two of
             the three libraries agree, the report names the third library.
@@ -87,8 +88,8 @@ def validate(
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
-        retry: "failed": repeat the check of robots that could not be checked before. The files of these
-            robots may have changed since then.
+        retry: "failed": check again the robots that an earlier run could not check. The files of these robots
+            may have changed since the earlier run.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
@@ -101,7 +102,8 @@ def validate(
         InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
             installed. The store contains a validation with other robots or settings, or another process uses
             the store.
-        InstallationError: Pinocchio is missing, or another project is installed under its name.
+        InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
+            another project.
         SourceError: The folder of the store cannot be created or used.
 
     >>> report = validate("ur5", samples=10)
@@ -226,8 +228,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: If a run has more samples than _WORTH_LOADING, compiled kernels on disk save time.
-#: If a run has more samples than _WORTH_COMPILING, even kernels that must be compiled first save time.
+#: A run with more than _WORTH_LOADING samples is faster with compiled kernels if all kernels are on disk.
+#: A run with more than _WORTH_COMPILING samples is faster even if the run must first compile the kernels.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

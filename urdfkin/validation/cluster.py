@@ -38,9 +38,9 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: A chunk is sent only if fewer than _PER_THREAD * threads + _MORE sent chunks have no answer.
+#: Maximum number of sent chunks without an answer: _PER_THREAD * threads + _MORE.
 #: The number of threads is the sum over all workers.
-#: With this number of chunks, no thread waits for its next chunk.
+#: With this number of chunks, no thread waits for a chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe, because a robot cannot crash a Dask worker.
@@ -63,8 +63,10 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
 
     `scheduler` is the address of a running scheduler, such as `tls://host:8786`, or `local:N` for N workers
     on this machine. Local workers open no port, and stop when the context ends. `tell` receives messages for
-    the user. Raise ClusterError if no scheduler answers, if a worker cannot run urdfkin, or if versions or
-    code on the cluster differ from those of this process.
+    the user.
+
+    Raise ClusterError if no scheduler answers, or if a worker cannot run urdfkin. ClusterError is also
+    raised if the versions or the code on the cluster differ from this process.
     """
     with _client(scheduler) as client:
         _check_versions(client)
@@ -130,7 +132,7 @@ class _ClusterWorker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """Yield a scheduler and workers in this process that open no port.
+    """Yield a scheduler and workers that run in this process and open no port.
 
     Dask adds its scratch folders to the front of `sys.path`. These folders are in a temporary folder that
     only this user can access, and `sys.path` is restored before any further import.
@@ -153,7 +155,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
                     raise ClusterError(
                         "this version of Dask opens a port for local workers",
                         found=str(server.address),
-                        remedy="use --jobs, or install another version of the package distributed",
+                        remedy="use --jobs, or install another version of the package `distributed`",
                     )
             try:
                 yield cluster
@@ -204,7 +206,8 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Each chunk without an answer has its task and the number of times that the chunk was sent.
+        #: Sent chunks without an answer.
+        #: Each value contains the task of the chunk and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
         #: Texts of robots that the workers store.
         self._robots: dict[int, Future[bytes]] = {}
@@ -262,7 +265,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Delete a robot's text on the workers if each sent chunk of the robot has its answer."""
+        """Delete a robot's text on the workers if no sent chunk of this robot waits for an answer."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

@@ -1,6 +1,6 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Each result is added to the results of adjacent chunks when the result arrives. Therefore, memory does not
+Each new result is added to the results of adjacent chunks immediately. Therefore, memory does not
 grow with the number of samples. The sum does not depend on the order in which the results arrive.
 """
 
@@ -30,7 +30,7 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: Number of finished chunks from an earlier run.
-        failures: Number of robots so far that have a disagreement or could not be checked.
+        failures: Number of robots that have a disagreement or could not be checked.
     """
 
     robots_done: int
@@ -46,7 +46,10 @@ Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
-    """The answers of a run, by robot and chunk; `parts` is the range of chunks to run for each robot."""
+    """Collect the answers of a run for each robot.
+
+    For each robot, `parts` contains the range of chunks to run.
+    """
 
     def __init__(
         self,
@@ -113,7 +116,8 @@ class _RobotAnswers:
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
-        #: Disjoint ranges of chunks in ascending order, each with the sum of the results of its chunks.
+        #: Pairs: a range of chunks, and the sum of the results of these chunks.
+        #: The ranges are disjoint and in ascending order.
         self._sums: list[tuple[range, ChunkResult]] = []
         self._has_disagreed = False
 
@@ -125,7 +129,10 @@ class _RobotAnswers:
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
-        """Insert a result; if adjacent chunks have results, replace these results by the sum."""
+        """Insert the result of a range of chunks.
+
+        The results of adjacent chunks and the new result are replaced by their sum.
+        """
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1

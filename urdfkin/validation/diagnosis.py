@@ -3,8 +3,8 @@
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
 results with the user's results. A mistake is reported if the mistake makes the largest difference at least a
-thousand times smaller. A mistake that explains a column of a Jacobian is also reported. If several mistakes
-explain the results, up to three are reported.
+thousand times smaller. If no mistake explains the whole result, the module reports mistakes in single columns
+of a Jacobian. At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains wrong results if at most this fraction of the difference remains.
-#: The remaining difference is the difference from urdfkin's results with the same mistake.
+#: A mistake is applied to urdfkin's results, and the difference from the user's results is computed again.
+#: The mistake explains the user's results if at most this fraction of the original difference remains.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
-#: Number of configurations in a fast test whether two joints are exchanged.
-#: The other configurations are compared only if this test succeeds.
+#: Number of configurations in a fast first test for exchanged joints.
+#: The other configurations are compared only if an exchange explains the results of the first test.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
@@ -62,7 +62,7 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the largest difference with a mistake, divided by the difference without a mistake.
+        """Return the largest difference with a mistake, divided by the largest difference without a mistake.
 
         `predicted` contains urdfkin's results with the mistake, for the first n configurations. If n is None,
         `predicted` contains the results for all configurations.
@@ -269,9 +269,9 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply joint entries of the first `count` inputs by a factor.
+        """Multiply the numbers of some joints in the first `count` inputs by `factor`.
 
-        `at` contains the index in q and the index in v of each joint.
+        `at` contains the index in q and the index in v of each of these joints.
         """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
@@ -413,7 +413,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield a sentence for each column that has the wrong sign, is zero or is another column.
+    """Yield a sentence for each column that has the opposite sign, is zero or equals a different column.
 
     The number before each sentence is the remainder, which is 0.0 for these mistakes.
     """

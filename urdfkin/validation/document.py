@@ -1,6 +1,7 @@
-"""JSON document of a validation: its types, from which the schema is generated, and the outcome.
+"""Types of the JSON document of a validation, and the outcome of a validation run.
 
-Only this module decides whether a run has passed, for new reports and for reports that are read from a file.
+The JSON schema is generated from these types. Only this module decides whether a run has passed, for new
+reports and for reports that are read from a file.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ class ReportedMimic(TypedDict):
 class ReportedRange(TypedDict):
     """The part of a joint's range in which all mimic joints of this joint are within their limits.
 
-    Both ends are null if the mimic joints exceed their limits everywhere in the range.
+    Both ends are null if at most one joint value keeps the mimic joints within their limits.
     """
 
-    lower: Annotated[float | None, doc("Lower end, rad or m; null: the part is empty.")]
-    upper: Annotated[float | None, doc("Upper end, rad or m; null: the part is empty.")]
+    lower: Annotated[float | None, doc("Lower end, rad or m; null: at most one joint value is allowed.")]
+    upper: Annotated[float | None, doc("Upper end, rad or m; null: at most one joint value is allowed.")]
     by: Annotated[list[str], doc("Names of the mimic joints that reduce the joint's range.")]
 
 
@@ -58,7 +59,10 @@ class ReportedJoint(TypedDict):
         doc("Kind of the joint."),
     ]
     parent: Annotated[str, doc("Name of the parent link.")]
-    child: Annotated[str, doc("Name of the child link; its frame is the joint's frame after the motion.")]
+    child: Annotated[
+        str,
+        doc("Name of the child link. The child link's frame is the joint's frame after the joint's motion."),
+    ]
     placement: Annotated[Matrix, doc("Pose of the joint's frame in the parent link's frame at q = 0.")]
     axis: Annotated[
         Annotated[list[float], of_length(3)] | None,
@@ -77,7 +81,7 @@ class ReportedJoint(TypedDict):
     remaining_range: Annotated[
         ReportedRange | None,
         doc(
-            "The part of the joint's range in which all its mimic joints are within their limits."
+            "The part of the joint's range in which all mimic joints of this joint are within their limits."
             " null: the joint's whole range."
         ),
     ]
@@ -145,8 +149,17 @@ class ReportedDHRow(TypedDict):
     a: Annotated[float, doc("Translation along x.")]
     alpha: Annotated[float, doc("Rotation about x.")]
     beta: Annotated[float, doc("Hayati parameter: rotation about y after alpha; 0 in other rows.")]
-    d: Annotated[float, doc("Translation along the joint axis; for a prismatic joint, its constant part.")]
-    theta: Annotated[float, doc("Rotation about the joint axis; for a revolute joint, its constant part.")]
+    d: Annotated[
+        float,
+        doc("Translation along the joint axis. For a prismatic joint: the constant part of the translation."),
+    ]
+    theta: Annotated[
+        float,
+        doc(
+            "Rotation about the joint axis. For a revolute or continuous joint: the constant part of the"
+            " rotation."
+        ),
+    ]
     sense: Annotated[
         Literal[1, -1],
         doc(
@@ -265,8 +278,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong. Either no two of the three libraries"
-            " agree, or one library agrees with two others that disagree with each other."
+            "Number of results that do not show which library is wrong. For these results, none or exactly"
+            " two of the three pairs of libraries agree."
         ),
     ]
 
@@ -317,7 +330,7 @@ class ReportedTimings(TypedDict):
     ]
     urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
-    compare: Annotated[float, doc("Time of computing the bounds and of the comparison.")]
+    compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
     second_oracle: NotRequired[Annotated[float, doc("Time of computing with the second oracle.")]]
 
 
@@ -436,9 +449,9 @@ class RunOutcome:
     """The outcome of a validation run.
 
     Attributes:
-        exit_code: 0 if everything is verified. Otherwise the first code that applies, in this order: 1 (a
-            disagreement), 130 (interrupted), 2 (a robot cannot be read), 3 (a robot was not verified, or
-            there was no robot).
+        exit_code: 0: every robot is verified. 1: a result disagrees. 130: the run was interrupted. 2: a robot
+            cannot be read. 3: a robot was not verified or has no report, or there was no robot. If several
+            codes apply, the first code in this order is used.
     """
 
     exit_code: int

@@ -1,11 +1,12 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
 An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers,
-so no result depends on the engine. If a robot has failed, an engine may skip the remaining chunks of this
-robot, but no others. Tasks are created only when they are needed, so a million tasks take no memory.
+so no result depends on the engine. If the answer of a chunk is a `Failure`, an engine may skip the remaining
+chunks of the same robot. The engine must run all other chunks. Tasks are created only when they are needed,
+so a million tasks take no memory.
 
-Each worker gets its own robot, so that only one worker has to read this robot. If no robot is waiting, a free
-worker takes chunks of the robot with the most chunks left.
+Different workers get chunks of different robots, so that most robots are read by one worker only. If no robot
+is waiting, a free worker takes chunks of the robot with the most remaining chunks.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ class CrossCheck:
 
     Attributes:
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
-        undecided: Number of results without a majority. Either all three libraries differ from each other,
-            or one library agrees with the two others, and these two differ.
+        undecided: Number of results without a majority. For these results, none or exactly two of the three
+            pairs of libraries agree.
     """
 
     by: str

@@ -91,7 +91,7 @@ class WorstResult:
 
 @dataclass(frozen=True)
 class FunctionCheck(Displayable):
-    """Result of `verify_function`: differences between a function's results and urdfkin's and the oracle's.
+    """Result of `verify_function`: the user's function compared with urdfkin and with the oracle.
 
     Attributes:
         function: Name of the function.
@@ -101,7 +101,7 @@ class FunctionCheck(Displayable):
         reference: Name of the reference frame; None if the quantity has no reference frame.
         convention: Name of the convention of inputs and results; None: urdfkin's convention.
         oracle: Name and version of the oracle that confirmed urdfkin's results; "" if no oracle could check
-            them.
+            urdfkin's results.
         samples: Number of configurations.
         compared: Number of results that have the right shape.
         factor: Number by which each bound is multiplied.
@@ -147,7 +147,7 @@ class FunctionCheck(Displayable):
 
     @property
     def agrees(self) -> bool:
-        """True if the function returned every result, and if each result is within the bound times `factor`.
+        """Whether every configuration has a valid result, and no difference exceeds `factor` times the bound.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -159,7 +159,7 @@ class FunctionCheck(Displayable):
 
     @property
     def smallest_factor(self) -> float:
-        """The smallest `factor` with which all compared results agree with urdfkin's.
+        """The smallest `factor` with which all compared results agree with urdfkin's results.
 
         >>> import urdfkin
         >>> import numpy as np
@@ -499,7 +499,7 @@ class _Run:
         return self.conversion.convert_result(self.row.name, native_inputs, result, jacobian)
 
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
-        """Return the scale of the bound for a result after its conversion to the function's convention.
+        """Convert the scale of a bound to the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
         """
@@ -524,14 +524,14 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return the rounding error of a conversion, in eps * scale; 0 if it only reorders numbers.
+        """Return a bound on the rounding error of the conversion, in eps * scale.
 
-        The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
-        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has an
-        error of up to 2 eps |q|. Each term of the result is a product of rotated vectors. Each joint may
-        rotate each of these vectors. Therefore, the errors of all rotation matrices are added for each
-        vector. The matrix that converts the velocities of a planar or floating joint adds at most 16 rounding
-        errors.
+        If the conversion only reorders numbers, the bound is 0. Any other conversion rounds each joint angle
+        before the angle is passed to the user's function. The rounded angle differs from urdfkin's angle by
+        up to 2 eps |q|. Therefore, the joint's rotation matrix has an error of up to 2 eps |q|. Each term of
+        the result is a product of rotated vectors. Each joint may rotate each of these vectors. Therefore,
+        the error of a vector is at most the sum of the errors of all rotation matrices. The matrix that
+        converts the velocities of a planar or floating joint adds at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None

@@ -22,7 +22,7 @@ from urdfkin.model.tree import KinematicTree
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace. It needs _PER_LINK bytes for each link.
+#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
 #: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
@@ -38,7 +38,7 @@ def limit(processes: int = 1) -> int | None:
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the size in bytes of one frame's largest array.
+    """Return the size in bytes of the largest array for one frame and `samples` samples.
 
     The largest array contains the Jacobians. If nv is at most 2, the largest array contains the placements.
     """

@@ -9,14 +9,14 @@ Each request is one line on the program's standard input:
 `coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
 needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock` (values
 of locked joints), `root_joint` and `convention` are present if the user gave them. The URDF file
-does not contain the locks and the root joint, because the request contains them. The answer is one line:
+contains neither the values of locked joints nor the root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
 The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
-another form, the call for this configuration raises `ProgramError`. The program is stopped, and is started
-again for the next configuration, but not after three consecutive failures. An answer with an error raises
-`ProgramError` too, but the program continues to run.
+another form, the call for this configuration raises `ProgramError`, and the program is stopped. The call for
+the next configuration starts the program again. After three consecutive failures, the program is not started
+again. An answer with the entry `error` raises `ProgramError`, but does not stop the program.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class Program:
             answer = self._parse_answer(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A late line of this program would be read as the answer to the next request.
+            self._stop()  # A delayed answer would be read as the answer to the next request.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):

@@ -43,7 +43,7 @@ def store_robot(robot: bytes) -> bytes:
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
     """Run a pickled chunk in a process; `client_provenance` contains the client's versions and digests.
 
-    The chunk is not run if this machine has other versions or digests.
+    If the versions or digests of this machine differ from the client's, the chunk is not run.
     """
     if client_provenance != provenance():
         return "other code", provenance()

@@ -39,7 +39,10 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return versions, and digests of urdfkin's computing code and of the equations."""
+    """Return the versions of `LIBRARIES`, a digest of urdfkin's code, and a digest of the equations.
+
+    The digest of the code does not include the packages in `_DISPLAY`.
+    """
     equations = hashlib.sha256(read_bytes(_PACKAGE / "kinematics" / "equations.py")).hexdigest()
     return {name: version(name) for name in LIBRARIES} | {"code": _code(), "equations": equations}
 
@@ -166,8 +169,8 @@ class ValidationReport(Displayable):
         interrupted: Whether the run ended early. Finished results are included.
         library_versions: Versions of urdfkin and the oracles that computed the report;
             None: the installed versions.
-        studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
-            of a robot failed.
+        studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
+            An element is None if the robot's study failed or is missing.
     """
 
     robots: tuple[RobotReport, ...]
@@ -220,7 +223,7 @@ class ValidationReport(Displayable):
 
     @property
     def outcome(self) -> RunOutcome:
-        """The outcome of the run, with the reason if it has not passed."""
+        """The outcome of the run. If the run has not passed, the outcome contains the reason."""
         return outcome((robot.verdict for robot in self.robots), self.robots_requested, self.interrupted)
 
     @property

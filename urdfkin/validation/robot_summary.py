@@ -81,7 +81,10 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
 
 
 def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
-    """Return the part of a joint's range in which its mimic joints are within limits; None: all of it."""
+    """Return the part of a joint's range in which the joint's mimic joints are within their limits.
+
+    Return None if this part is the whole range.
+    """
     if narrowed is None:
         return None
     lower, upper = narrowed.allowed_range or (None, None)

@@ -343,9 +343,9 @@ def _is_ours(path: Path) -> bool:
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Return the store with its manifest.
 
-    The manifest is written if the folder has no manifest. With `retry_failed`, the manifest is also written
-    if only the files of failed robots have changed. In all other cases, the folder keeps its manifest,
-    because the manifest contains the original start time.
+    If the folder has no manifest, the manifest is written. If `retry_failed` is True and only the files of
+    failed robots have changed, the manifest is replaced. In all other cases, the folder keeps the old
+    manifest, because the old manifest contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -472,7 +472,11 @@ class AccuracyStore:
 
     @classmethod
     def from_store(cls, store: Store) -> AccuracyStore | None:
-        """Return the results in a store; None if there are none, or the settings are unreadable."""
+        """Return the accuracy results in a store.
+
+        Return None if the store has no accuracy results. Return None with a message to the user if the
+        settings of the accuracy study cannot be read.
+        """
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
                 return None

@@ -2,8 +2,8 @@
 
 The file `robots/features.toml` defines small robots, each with one feature of URDF. For robots of the
 catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimal
-numbers in the URDF. Configurations are computed from sha256 digests of names. Therefore, the vectors depend
-only on the URDF and the names.
+numbers in the URDF. Configurations are computed from SHA-256 digests of the robot's name, the names of joints
+and indices. Therefore, the vectors depend only on the URDF and the robot's name.
 """
 
 from __future__ import annotations
@@ -89,8 +89,12 @@ class JointEntry(TypedDict):
 
     name: Annotated[str, doc("Name of the joint.")]
     type: Annotated[str, doc("Type of the joint in the URDF.")]
-    q: Annotated[list[Count], of_length(2), doc("First index in q, and the index after the last.")]
-    v: Annotated[list[Count], of_length(2), doc("First index in v and a, and the index after the last.")]
+    q: Annotated[list[Count], of_length(2), doc("Indices [start, stop]: q[start:stop] belongs to the joint.")]
+    v: Annotated[
+        list[Count],
+        of_length(2),
+        doc("Indices [start, stop]: v[start:stop] and a[start:stop] belong to the joint."),
+    ]
 
 
 class Result(TypedDict):
@@ -144,7 +148,10 @@ class Vectors(TypedDict):
     rule: Annotated[str | None, doc("The rule of the URDF standard that this robot tests, or null.")]
     note: Annotated[
         str | None,
-        doc("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
+        doc(
+            "Known difference between libraries, or why the mimic rules of the robot are invalid."
+            " null: no remark."
+        ),
     ]
     joints: list[JointEntry]
     samples: list[Sample]
@@ -220,7 +227,7 @@ def _robot(row: Mapping[str, Any]) -> str:
 
 
 def _fraction(*words: object) -> float:
-    """Return a number in [0, 1) from the sha256 of some words."""
+    """Return a number in [0, 1) that is computed from the SHA-256 digest of `words`."""
     digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
@@ -230,7 +237,10 @@ def _on_grid(x: float) -> float:
 
 
 def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return q, v and a of a sample; they depend only on the robot's name, joints and limits."""
+    """Return q, v and a of a sample.
+
+    The numbers depend only on the index of the sample and on the robot's name, joints and limits.
+    """
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         unit = [_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
@@ -396,7 +406,10 @@ def _sample(
 def _results(
     robot: Robot, frames: Sequence[str], inputs: tuple[FloatArray, ...], digits: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of a sample; a value is None if more digits are needed to round it to 17 digits."""
+    """Yield the results of a sample.
+
+    A value is None if `digits` is too small to round the value to 17 significant digits.
+    """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:
         link = tree.frame_link(frame)

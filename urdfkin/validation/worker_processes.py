@@ -50,7 +50,7 @@ class WorkerProcess:
             raise
         finally:
             # Close the worker's end of the pipe in this process.
-            # If this process kept that end open, the pipe would stay open after the worker ends.
+            # If the worker's end stayed open in this process, the pipe would stay open after the worker ends.
             theirs.close()
 
     @property
@@ -154,7 +154,7 @@ class _WorkerPool:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: For each robot that crashed a process, the tasks that will run again.
+        #: Tasks that will run again, for each robot that crashed a process.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
