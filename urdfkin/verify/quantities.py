@@ -240,9 +240,9 @@ HESSIAN = Quantity(
     heading="H",
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
-    help_text="The table has a group of rows for each column of the Jacobian. Each row is the derivative of"
-    " the column by one joint coordinate. The sum of the rows of a group, each multiplied by the velocity"
-    " of its joint, is a row of `urdfkin jacobian-rate`.",
+    help_text="The table has a group of rows for each column of the Jacobian. Each row of a group"
+    " is the derivative of the group's column by one joint coordinate. Multiply each row of a group by the"
+    " velocity of the row's joint. The sum of these products is a row of `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(

@@ -157,7 +157,8 @@ class _Explanation:
             lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
         if self._rank == usual:
             reasons = [
-                "Random configurations have the same rank, so the arm is the cause, not this configuration."
+                "The Jacobian has the same rank at random configurations."
+                " The arm causes the loss of rank, not this configuration."
             ]
         else:
             reasons = [*self._describe_directions(lost), *self._describe_causes(lost, motions)]

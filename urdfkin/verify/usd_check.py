@@ -275,7 +275,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         worst = max(worst[0], off), max(worst[1], angle)
         if share > 1.0:
             what = (
-                f"the prim's pose and the pose by the joints differ by {off:.3g} m"
+                f"the prim's pose and the pose computed from the joints differ by {off:.3g} m"
                 f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(

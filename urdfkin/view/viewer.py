@@ -263,7 +263,7 @@ def missing_words(missing: Iterable[Shape]) -> str:
     more = f"\n- and {len(names) - _MOST_MISSING} more" if len(names) > _MOST_MISSING else ""
     packages = any(name.startswith(("package://", "model://")) for name in names)
     remedy = (
-        "Set `ROS_PACKAGE_PATH` to the folder that contains their packages."
+        "Set `ROS_PACKAGE_PATH` to the folder that contains the packages of the meshes."
         if packages
         else "Put the files at the paths in the URDF."
     )
