@@ -386,7 +386,8 @@ def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> 
     one = found(robot, [0.1, 0.2, 0.3, 0.4, 0.5])
     assert (one.rank, one.full_rank, len(one.lost_directions), len(one.null_motions)) == (3, 5, 0, 2)
     assert one.reasons == (
-        "Random configurations have the same rank, so the arm is the cause, not this configuration.",
+        "The Jacobian has the same rank at random configurations."
+        " The arm causes the loss of rank, not this configuration.",
     )
     stretched = found(robot, np.zeros(5), "linear")
     assert stretched.lost_directions.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]

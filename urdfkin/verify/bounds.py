@@ -1,8 +1,9 @@
 """Bounds on the difference between two correct computations of a quantity.
 
 Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
+the bound k * eps * scale.
 
-    k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
+    eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
@@ -29,9 +30,9 @@ rounding error:
 The reference frames LOCAL and WORLD need one more factor. For LOCAL, this factor is a rotation into the
 frame's axes. For WORLD, this factor is a cross product with the frame's position p.
 
-For each joint, measured differences are below eps * scale, because rounding errors rarely all have the same
-sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared between small
-and large robots.
+In measurements, each joint adds less than eps * scale to a difference, because rounding errors rarely all
+have the same sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared
+between small and large robots.
 
 *Magnitudes.* `compute_magnitudes` replaces each vector by its length and evaluates the equations 7.58 and
 7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds
@@ -175,7 +176,11 @@ class _MovingJoint(NamedTuple):
 
 
 class _FrameEnd(NamedTuple):
-    """A frame, the last moving joint `step` before the frame, and the path length (m) from joint to frame."""
+    """A frame of a compiled tree.
+
+    `step` is the index of the last moving joint before the frame. `length` is the length (m) of the path from
+    this joint to the frame.
+    """
 
     step: int
     frame: int
@@ -213,7 +218,10 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array (n or 1, ...), or Python numbers for one configuration."""
+    """Return the columns of an array.
+
+    For a single configuration, the columns are Python numbers.
+    """
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
@@ -225,7 +233,7 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Number of translations and number of rotations, for a planar and for a floating joint.
+#: The first number of a pair is the joint's number of translations, the second number of rotations.
 _FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -286,7 +294,7 @@ class Bound:
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the bound's `k` for each result, as an array of shape `leading`.
 
-    A `k` that is not finite and positive becomes NaN, so that no result is within the bound.
+    If `k` is 0, negative or infinite, the function replaces `k` by NaN. No result is then within the bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -336,8 +344,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rule_count: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint,
-            the rules of both joints count.
+        rule_count: Number of mimic rules of the joints on the path. If a joint mimics another mimic joint,
+            the number includes the rules of both joints.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. If terms in a chain of mimic rules
             cancel each other, their rounding errors do not cancel. The added length of a prismatic mimic
             joint is then positive.
@@ -356,9 +364,9 @@ def true_value_magnitudes(
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
     values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each
     joint. One program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The
-    difference of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the
-    axis and the true value have an error of half an eps each. The error of the axis counts twice, because two
-    rotations use the axis. The conversion of two kinds of numbers causes larger errors:
+    remaining 7.2 rounding errors cover the conversion of decimals to doubles. The offset, the axis and the
+    true value have an error of half an eps each. The error of the axis counts twice, because two rotations
+    use the axis. The conversion of two kinds of numbers causes larger errors:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
       rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -367,9 +375,9 @@ def true_value_magnitudes(
       multiplied by |m|.
 
     *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
-    value of the joint with all terms replaced by their absolute values. For an independent joint, X is |q|.
-    For a joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules to
-    one rule M q + C. The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum
+    sum of the absolute values of all terms in the joint's value. For an independent joint, X is |q|. For a
+    joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules to one
+    rule M q + C. The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum
     exceeds X, so the combined rule adds an error of at most (r - 1) / 2 X eps. All other rounding errors are
     the same as in a program that applies the r rules one after the other.
 
@@ -379,8 +387,9 @@ def true_value_magnitudes(
     *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement therefore has an
     error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
     cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
-    displacement. With this length, the bound allows an error of 3/2 eps for each rule. The velocity and the
-    acceleration of the joint have the same error bound, because they are rounded less often.
+    displacement. With this length, the bound allows an error of 3/2 eps for each rule. This bound also covers
+    the joint's velocity and acceleration. Velocity and acceleration are rounded less often than the
+    displacement.
 
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
@@ -418,8 +427,8 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
     of a position changes by at most the angle error times the length of the path. To first order, the numbers
     therefore change by at most `angles` * eps/2 * scale. The function multiplies the scale by 1 + `angles` /
-    k, so the bound increases by `angles` * eps * scale. This increase is twice the change of first order, and
-    therefore also covers the terms of second order.
+    k, so the bound increases by `angles` * eps * scale. The increase of the bound is twice the first-order
+    change of the numbers. The increase therefore also covers second-order terms.
 
     `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
     lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
@@ -517,8 +526,8 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
 
 
 #: In the linear rows, Pinocchio's derivative of Jacobian column i by joint j is a sum of cross products.
-#: The first pair is for a joint j that is joint i, or is nearer to the root than joint i.
-#: The second pair is for all other joints j.
+#: The joints on the path are numbered from the root.
+#: The first pair of numbers is valid for j <= i, the second pair for j > i.
 #: The first number of a pair is the number of products z x (z x d), if both joints are revolute.
 #: The second number is the number of products z x z, if one joint is revolute and the other is prismatic.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
@@ -533,8 +542,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
-    column of the mimicked joint. An entry can therefore be a sum over several pairs. The scale of this entry
-    is the sum of the scales of the pairs. A lever arm d is never longer than the path.
+    column of the mimicked joint. An entry can therefore be a sum over several pairs. The function adds the
+    scales of these pairs. A lever arm d is never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
     contains the numbers of products that these steps add:
@@ -545,8 +554,8 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 
     In the linear rows, urdfkin computes one product z x (z x d), or the two products of c_1 x c_2. In LOCAL,
     urdfkin first rotates the two columns by R. Each of the two products then has the five factors R, z, R, z
-    and d. The bound allows three products of four factors each (12 in total). This number covers the 10
-    factors of urdfkin.
+    and d, so urdfkin has 10 factors in total. The bound allows 12 factors: three products of four factors
+    each.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -571,10 +580,10 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
-    be the angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u
-    and t = R e_k (`urdfkin.verify.analytical_reference`). Let s = |e_i x t|, which is the sine or cosine of
-    the middle angle:
+    The position rows have the same bound as the rows of the velocity Jacobian. The other three rows are the
+    derivatives of the Euler angles. Let w be the angular part of one column of the velocity Jacobian. The
+    rotation axes of the three angles are e_i, u and t = R e_k (`urdfkin.verify.analytical_reference`). Let s
+    = |e_i x t|, which is the sine or cosine of the middle angle:
 
     | Row | Element | Length of the vector |
     |---|---|---|
@@ -583,7 +592,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
 
     Let delta = k eps be the error of t, and also the relative error of w. The error of t rotates u by at most
     delta / s. Let r' be the reciprocal vector of t. The error of t changes r by the vector -(r . du) u - (r .
-    dt) r', which is at most 2 delta / s^2 long. The errors of the rows are:
+    dt) r'. This vector is at most 2 delta / s^2 long. The errors of the rows are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
@@ -591,9 +600,9 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `axis_sine` - delta. The functions arctan2 and sine add about 3
-    eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
-    contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the
-    bound covers the 13 eps.
+    eps, and products and quotients about 10 eps. The sum is 13 eps. `Magnitudes.roundings` counts one joint
+    more than the path contains. For the additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` =
+    24 eps, which is more than 13 eps.
 
     `bound` is the bound of the velocity Jacobian, and `axis_sine` (n, frames) is s of Pinocchio's rotation.
     """
@@ -612,10 +621,10 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 
     Analytical Jacobians for quaternions are never singular. The rows of positions have the bound of the
     velocity Jacobian. Let delta be the error of R. The elements of the matrix 4 q q^T are linear functions of
-    R. The longest row of this matrix has a length of at least 2 and an error below 4.6 delta, so the error of
-    q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an error of (2.3
-    + 1) / 2 delta |w|. This error is below 2 delta |w|, the bound on the angular velocity in the velocity
-    Jacobian.
+    R. The longest row of this matrix has a length of at least 2. The error of this row is below 4.6 delta, so
+    the error of q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an
+    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|, the bound on the angular velocity in
+    the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -632,7 +641,8 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def singularity_margin(plan: CompiledTree) -> float:
     """Return four times the error of a frame's rotation, rad.
 
-    At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
+    If Euler angles are closer to a singularity than this margin, no digit of the analytical Jacobian is
+    reliable.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 

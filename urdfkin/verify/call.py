@@ -27,11 +27,11 @@ _PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
 class CallPart(NamedTuple):
-    """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
+    """Some of the configurations of a call, as inputs of urdfkin and as inputs of the oracle.
 
     `rates` is an empty tuple for a placement, (v,) for a velocity, and (v, a) for an acceleration. The arrays
     v and a have the shape (n, nv). `state` (n or 1, 24) is the state of the moving base. `query` is the input
-    of the oracle.
+    of the oracle. urdfkin's inputs and `query` are converted from the user's arguments independently.
     """
 
     plan: CompiledTree
@@ -171,7 +171,7 @@ def _describe_array(out: object) -> str:
 
 
 def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and the names."""
+    """Return whether `frame` is a list, and the names of the frames."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

@@ -31,7 +31,8 @@ class VerificationError(UrdfkinError):
     Attributes:
         quantity: Name of the quantity.
         frame: Name of the frame.
-        reference: Reference frame; for an analytical Jacobian, the representation.
+        reference: Name of the reference frame. For an analytical Jacobian, name of the rotation's
+            representation, such as "quaternion".
         index: Index of the worst sample in the batch.
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
@@ -98,7 +99,10 @@ class LineEntry(TypedDict):
     checked: Annotated[Count, doc("Number of results that the oracle confirmed.")]
     worst: Annotated[
         Size | None,
-        doc("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
+        doc(
+            "Largest difference between a result and the oracle's result, in multiples of eps * scale;"
+            " null: the difference is not finite."
+        ),
     ]
     bound_ratio: Annotated[
         Size | None, doc("Largest ratio of a difference to its bound; null: the ratio is not finite.")

@@ -30,7 +30,7 @@ class BatchComparison:
     Attributes:
         worst: Largest difference of two numbers, in multiples of eps * scale.
         bound_ratio: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
-        index: Index in each batch axis of the result with the largest ratio.
+        index: Index of the result with the largest ratio: one number for each axis of the batch.
     """
 
     result_count: int = 0
@@ -41,7 +41,7 @@ class BatchComparison:
     def __add__(self, other: BatchComparison) -> BatchComparison:
         """Combine the comparisons of two batches.
 
-        `index` comes from the batch with the larger `share`. NaN counts as larger than any number.
+        `index` comes from the batch with the larger `bound_ratio`. NaN counts as larger than any number.
         """
         second_is_larger = other.bound_ratio > self.bound_ratio or (
             np.isnan(other.bound_ratio) and not np.isnan(self.bound_ratio)

@@ -68,10 +68,11 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     the child link, Pinocchio's frame includes the joint's motion. If the chain leads from the child link to
     the parent link, Pinocchio's frame does not include the motion.
 
-    Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
-    computes along the chain, which is a part of the two paths. The bound allows for the rounding errors of
-    all joints on both paths of Pinocchio. The length in the bound is the distance of the first frame from the
-    root plus the length of the chain, with prismatic displacements.
+    Pinocchio computes along two paths: from the root to the first frame of the chain, and from the root to
+    the last frame. urdfkin computes along the chain, which is a part of the two paths. The bound allows for
+    the rounding errors of all joints on both paths of Pinocchio. The length in the bound is the distance of
+    the first frame from the root plus the length of the chain. The length of the chain includes prismatic
+    displacements.
     """
     if verifier.find_refusal() is not None:
         return None
@@ -260,7 +261,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
+    # The rotation matrices of the table's base and tool may be rounded to six digits.
+    # The rotations in the URDF are exact, so the bound includes the errors of these matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

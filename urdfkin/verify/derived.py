@@ -63,7 +63,7 @@ def check_relative_placement(
 
     `compute_bound` computes the bound of placements in the world. The relative placement is the pose of frame
     b relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and
-    k_a rounding errors; the path to frame b has the length s_b and k_b rounding errors. Errors in multiples
+    k_a rounding errors. The path to frame b has the length s_b and k_b rounding errors. Errors in multiples
     of eps:
 
     | Number | Source | Error at most |
@@ -74,8 +74,7 @@ def check_relative_placement(
     | rotation R_a^T R_b | R_a and R_b | k_a + k_b |
 
     The difference p_b - p_a and the products add about 5 eps. Each of k_a and k_b counts one joint more than
-    the path contains. For this additional joint, the bound allows at least 24 eps, so the bound covers the 5
-    eps.
+    the path contains. For the additional joint, the bound allows at least 24 eps, which is more than 5 eps.
     """
     other = cast("str", x.options["relative_to"])
     T = oracle.placements(x.query._replace(frames=[*x.query.frames, other]))

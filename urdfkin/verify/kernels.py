@@ -61,7 +61,10 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Return the largest difference in row `i`, in units of eps * `scale[k]`, for finite numbers."""
+    """Return the largest difference between `ours[i]` and `theirs[i]`, in units of eps * `scale[k]`.
+
+    The numbers must be finite.
+    """
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _in_eps_scale(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -122,10 +125,10 @@ def _largest_bits(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
-    The rows of `scale` are repeated if `scale` has fewer rows than `out`. Only in this case does the kernel
-    use `unit` (the size of `scale`) and `units` (one row) as working memory. `out_bits` and `bits` are views
-    of `out` and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum
-    of doubles.
+    The rows of `scale` are repeated if `scale` has fewer rows than `out`. The kernel can then use `unit` and
+    `units` as working memory. `unit` has as many numbers as `scale`, and `units` has as many numbers as one
+    row. Without repeated rows, the kernel uses neither array. `out_bits` and `bits` are views of `out` and
+    `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum of doubles.
     """
     known = in_triples = len(scale) < len(out)
     for k in range(len(scale)):
@@ -168,7 +171,7 @@ def coupling(full, columns, index, factor, out):
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
 #: Number of bounds (p, w, vel, alpha, acc) for each link.
-#: `free` contains the same number of lengths for each planar or floating joint.
+#: `free` contains five lengths for each planar or floating joint.
 _STATE_SIZE = _FREE_SIZE = 5
 
 

@@ -205,7 +205,7 @@ def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound
         return f"not compared with Pinocchio's MJCF reader ({found['error']})"
     names = list(found["bodies"])
     if not names:
-        return "Pinocchio's MJCF reader also finds no body"
+        return "not compared with Pinocchio's MJCF reader, because the file has no bodies"
     places = [name for name, _ in reading.answer["frames"]]
     bodies, theirs = [places.index(name) for name in names], _unpack_placements(found["placements"])
     share = _compute_bound_shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))

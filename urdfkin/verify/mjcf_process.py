@@ -60,7 +60,10 @@ def serve() -> None:
 
 
 def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
-    """Return an answer that makes `parse_answers` raise an error; `what` describes an unexpected error."""
+    """Return an answer that describes `error`; `parse_answers` raises InputError for this answer.
+
+    `what` is the message of the InputError if `error` is not an UrdfkinError.
+    """
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
         return {"error": parts | {"found": _add_memory_hint(error.found)}}

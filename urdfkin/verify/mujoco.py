@@ -9,8 +9,8 @@ changes the text before MuJoCo reads it:
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
-- Mimic rules are removed, because MuJoCo would turn them into constraints, which its kinematics ignores. This
-  module computes the values of mimic joints with the rules from `rules_of_text`.
+- Mimic rules are removed. MuJoCo would convert mimic rules to constraints, and MuJoCo's kinematics ignores
+  constraints. This module computes the values of mimic joints with the rules from `rules_of_text`.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
@@ -260,10 +260,10 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return placements (n, frames, 4, 4); call `read(body, (k, f))` for each sample k and frame f.
+        """Return placements (n, frames, 4, 4).
 
-        MuJoCo receives the first `count` of the inputs q, v and a. `read` can read further results from
-        `self.data`.
+        The method calls `read(body, (k, f))` for each sample k and frame f. MuJoCo receives the first `count`
+        of the inputs q, v and a. `read` can read further results from `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]

@@ -98,13 +98,17 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
-#: `_COORDINATE_COUNTS` maps each size to the joint's number of coordinates in urdfkin.
+#: `_COORDINATE_COUNTS` maps a joint's size in Pinocchio to the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """First indices of a joint in q and v, in Pinocchio (`full_q`, `full_v`) and in urdfkin."""
+    """Indices of one joint in the vectors of Pinocchio and of urdfkin.
+
+    `full_q` and `full_v` are the joint's first indices in Pinocchio's q and v. `q` and `v` are the first
+    indices in urdfkin's q and v. For a mimic joint, `q` and `v` belong to the mimicked joint.
+    """
 
     sizes: tuple[int, int]
     full_q: int
@@ -116,7 +120,7 @@ class _JointIndices(NamedTuple):
 
 
 class PinocchioLayout:
-    """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's.
+    """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's columns.
 
     `joints` contains Pinocchio's joint indices, and `rules` the resolved mimic rules. `rate_columns` lists
     the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
@@ -275,7 +279,10 @@ def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Fram
 
 
 class BaseNumbers(Protocol):
-    """Placement, velocity and acceleration of the base, as given by the user; leading axes are samples."""
+    """Placement, velocity and acceleration of the base, as given by the user.
+
+    The leading axes of each array are the axes of the batch.
+    """
 
     @property
     def placement(self) -> FloatArray:
@@ -312,7 +319,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Rounding gives the computed q small components along the other eigenvectors of K.
+    # Because of rounding, the computed q has small components along the other eigenvectors of K.
     # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -346,9 +353,9 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Names of the coordinates of a planar joint (3 joint velocities) and of a floating joint (6).
+#: Names of a joint's coordinates, by the joint's number of velocities (planar joint: 3, floating joint: 6).
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
-#: Names of the joint velocities of a planar joint (3) or a floating joint (6).
+#: Names of a joint's velocities, by the joint's number of velocities (planar joint: 3, floating joint: 6).
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
@@ -414,7 +421,8 @@ class QueryBatch(NamedTuple):
     """The arguments that an oracle receives for n configurations.
 
     `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `frames_are_joints` is True,
-    `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+    `frames` contains `JointFrame` objects. Pinocchio then computes Jacobians and J-dot with the functions for
+    joints instead of the functions for frames.
 
     If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
     frame may round differently from its function for several frames. Therefore, Pinocchio uses the function
@@ -553,7 +561,8 @@ class Oracle:
     that the tree contains and the text does not contain. `lock` contains the values (rad or m) of locked
     joints. `new_data` returns a new data structure of the library, for one thread.
 
-    Raises OracleError if the library does not accept the text, or reads other joints from the text.
+    Raises OracleError if the library does not accept the text, or if the library's joints differ from the
+    joints of `tree`.
     """
 
     title: ClassVar[str]
@@ -576,7 +585,7 @@ class Oracle:
     def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the mimic rules of `joints`, the library's moving joints.
 
-        Raises OracleError if the joints or their order differ from the tree's.
+        Raises OracleError if the tree has other joints, or has the joints in another order.
         """
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}

@@ -67,7 +67,10 @@ def _library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with a name; raise UnknownNameError, or InputError for a missing library."""
+    """Return the oracle with the given name.
+
+    Raises UnknownNameError for an unknown name, and InputError if MuJoCo is the oracle and is not installed.
+    """
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
@@ -77,7 +80,11 @@ def oracle_library(name: object) -> OracleLibrary:
 
 
 def version(package: str) -> str:
-    """Return the version of a package, or "not installed"; "a checkout" if urdfkin is not installed."""
+    """Return the version of a package.
+
+    For a package that is not installed, the result is "not installed". For urdfkin, the result is then "a
+    checkout" instead.
+    """
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

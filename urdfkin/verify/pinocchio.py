@@ -9,7 +9,7 @@ The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF t
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
 if their mimic joints are enabled. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules
-define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full"
+define a matrix G and a vector g_0. Then q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full"
 marks Pinocchio's vectors, which contain numbers for the mimic joints too.
 """
 
@@ -114,7 +114,8 @@ _SAFE_DEPTH = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MAX_NV = 315
 
-#: Number of floating-point values in a block of results that fits into the processor's cache.
+#: Number of floating-point values in a block of results.
+#: A block of this size fits into the processor's cache.
 _BLOCK_SIZE = 16384
 #: Function of n that returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
@@ -189,7 +190,8 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` would have reported every known reason, so the reason of this error is unknown.
+        # For the known causes of this error, `urdfkin check` has a finding, and urdfkin builds no model.
+        # The cause of this error is therefore unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,

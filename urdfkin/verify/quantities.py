@@ -53,7 +53,7 @@ class Quantity:
         inputs: The inputs of the quantity: "q", "qv" or "qva".
         shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
-            frames, ...). If `recursive` is False, the arguments of `compute` may differ.
+            frames, ...). If `recursive` is False, `compute` may have other arguments.
         ask_oracle: Function (oracle, query) that returns the oracle's results (n, frames, ...).
         blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
         scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
@@ -64,8 +64,8 @@ class Quantity:
             `ask_oracle` and `scale`.
         compute_intervals: Function (motion, link, reference) that returns intervals around the true values.
         recursive: True if the forward recursion computes the quantity for any list of frames.
-        in_validation: True if `validate`, the accuracy study and plots include the quantity. They
-            do not include the Hessian, because a Hessian has nv times as many numbers as a Jacobian.
+        in_validation: True if `validate`, the accuracy study and plots include the quantity. The Hessian is
+            not included, because a Hessian has nv times as many numbers as a Jacobian.
         has_reference: True if the quantity depends on a reference frame.
         object_kind: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         heading: Heading of the column in reports; several quantities may share a column.
@@ -240,9 +240,9 @@ HESSIAN = Quantity(
     heading="H",
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
-    help_text="The table has a group of rows for each column of the Jacobian. Each row is the derivative of"
-    " the column by one joint coordinate. The sum of the rows of a group, each multiplied by the velocity"
-    " of its joint, is a row of `urdfkin jacobian-rate`.",
+    help_text="The table has a group of rows for each column of the Jacobian. Each row of a group"
+    " is the derivative of the group's column by one joint coordinate. Multiply each row of a group by the"
+    " velocity of the row's joint. The sum of these products is a row of `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(
@@ -369,7 +369,10 @@ def quantities_by_command() -> dict[str, Quantity]:
 
 
 def find_quantity(name: str) -> Quantity:
-    """Return the quantity with a name; raise UnknownNameError with the nearest names."""
+    """Return the quantity that has this name.
+
+    For an unknown name, raises UnknownNameError with the nearest names.
+    """
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found

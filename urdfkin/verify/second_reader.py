@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 #: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
 #: A sine and a cosine have an error of one eps each.
-#: Two products and a sum of at most 1 have an error of half an eps each.
+#: The values of two products and one sum are at most 1, so each has an error of at most half an eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference of a component of an axis that two programs normalise.
 #: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
-#: An axis is normalised if its length differs from 1 by at most this number.
+#: yourdfpy's axis counts as normalised if the length of the axis differs from 1 by at most this number.
 _UNIT_TOLERANCE = 1e-6
 _MAX_DIFFERENCES = 8
 _MAX_QUOTE_LENGTH = 200
@@ -70,7 +70,7 @@ def compare_with_yourdfpy(
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
     If `mimic` is False, the mimic rules are not compared. If `root_joint` is True, `load` has added the first
-    joint and the first link of the tree. These two are not in the text.
+    joint and the first link of the tree. The URDF text does not contain this joint and this link.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # A document type declaration can name other files, and yourdfpy would read these files.

@@ -42,8 +42,8 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
         error: (..., 6, nv) bound on the error of each number of J.
-        is_revolute: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint,
-            None for a column that does not belong to a single joint axis.
+        is_revolute: (nv,) For each column, True for a revolute joint and False for a prismatic joint. The
+            value is None if the column does not belong to a single joint axis.
         active_entries: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
         moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
@@ -147,8 +147,7 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # The arm may have fewer joints than the Jacobian has rows.
-        # Then the directions without motion depend on the configuration.
+        # If the arm has fewer joints than the Jacobian has rows, lost directions depend on q.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -158,7 +157,8 @@ class _Explanation:
             lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
         if self._rank == usual:
             reasons = [
-                "Random configurations have the same rank, so the arm is the cause, not this configuration."
+                "The Jacobian has the same rank at random configurations."
+                " The arm causes the loss of rank, not this configuration."
             ]
         else:
             reasons = [*self._describe_directions(lost), *self._describe_causes(lost, motions)]

@@ -15,11 +15,12 @@ results come from `urdfkin.kinematics.equations`, so this module implements the 
 The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
 that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
 effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
-the length of the path from the root to the table's base plus the length of the path from the root to the tip.
-Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum instead of the reach, but at most `MAX_LENGTH_RATIO` times the reach. In a
-table with Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic
-rules. The bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
+the sum of two path lengths. One path leads from the root to the table's base, the other path from the root to
+the tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than
+the reach, the bound uses this sum instead of the reach. The bound uses at most `MAX_LENGTH_RATIO` times the
+reach. In a table with Hayati rows, no single length exceeds this limit. A coordinate can move several joints
+by mimic rules. The bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these
+joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -51,7 +52,9 @@ MAX_LENGTH_RATIO = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table differs from Pinocchio by more than rounding errors and the option `--snap` can explain.
+    """The difference between a table and Pinocchio exceeds the bound.
+
+    The bound covers rounding errors and the effect of the option `--snap`.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)
@@ -70,11 +73,11 @@ class TableCheck:
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
             quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
-        bound_ratios: Ratio of the difference to its bound, for the same three quantities. A ratio above 1
-            is a disagreement, unless `loss` explains the difference.
+        bound_ratios: Ratio of the difference to its bound for "placement", "jacobian" and "acceleration". A
+            ratio above 1 is a disagreement, unless `loss` explains the difference.
         has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
-        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
-            difference. Otherwise None.
+        loss: Text about the longest length in the table, if very large lengths cause a difference above the
+            bound. In all other cases, `loss` is None.
     """
 
     samples: int
@@ -167,9 +170,9 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: One pair for the linear and one for the angular differences.
-    #: The first value is multiplied by the relative rounding error.
-    #: The second value is the effect of snapping.
+    #: Each quantity has a pair of numbers for linear differences, and a pair for angular differences.
+    #: The bound is the first number times the relative rounding error, plus the second number.
+    #: The second number of a pair is the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
@@ -234,8 +237,8 @@ class ErrorScales:
     """Lengths and velocities to which the bounds on rounding errors are proportional.
 
     Attributes:
-        reach: (n,) length of the path from the root to the table's base plus length of the path from the root
-            to the table's tip, m.
+        reach: (n,) sum of two path lengths, m: from the root to the table's base, and from the root to the
+            table's tip. The module docstring states how long lengths in the table increase `reach`.
         turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
             Only joints from the root to the table's base or tip count.
         sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.

@@ -6,9 +6,9 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 - with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
   of freedom and limits for each joint. A difference raises OracleError.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
-  robot in one configuration, in which each link must have the placement of its prim. The file states the
-  prims' transforms separately from the joint frames. A difference means that the file contradicts itself;
-  `load` reports the difference as a warning.
+  robot in one configuration. In this configuration, each link must have the placement of the link's prim. The
+  file states the prims' transforms separately from the joint frames. A difference means that the file
+  contradicts itself; `load` reports the difference as a warning.
 
 Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """
@@ -52,7 +52,10 @@ _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage."""
+    """The result of reading a USD stage in a separate process.
+
+    `urdf` is the stage's tree as a URDF text. `answer` contains all data that the process returned.
+    """
 
     urdf: str
     remarks: tuple[UsdRemark, ...]
@@ -75,7 +78,7 @@ def read_usd(
     """
     version()
     path = expand_home(source)
-    read_bytes(path)  # `read_bytes` raises the usual error if the file is missing.
+    read_bytes(path)  # `read_bytes` raises SourceError if the file is missing.
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -121,10 +124,9 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
-      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION_ROUNDINGS` is this factor
-      18.
-    - Origin: three rounding errors (`_ORIGIN_ROUNDINGS`): of the scale factor, of the scaled origin, and of
-      the transformed origin.
+      is twice this length, 16 u. The sum of both angle errors is 18 u, so `_ROTATION_ROUNDINGS` is 18.
+    - Origin: the scale factor, the scaled origin and the transformed origin have one rounding error each.
+      `_ORIGIN_ROUNDINGS` is therefore 3.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -161,7 +163,8 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single_precision`).
+#: Five numbers for each joint name, which bound the effect of rounding to single precision.
+#: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -172,10 +175,9 @@ class SinglePrecisionErrors:
     Attributes:
         links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
             configurations.
-        joints: (joints, 3) three errors for each joint in the zero configuration. The first two are the
-            largest position error (m) and angle error (rad) of the child link's frame relative to the parent
-            link's frame. The third is the relative error of the multiplier and the offset in the joint's
-            mimic rule.
+        joints: (joints, 3) errors of each joint in the zero configuration. Columns 0 and 1 are the largest
+            position error (m) and angle error (rad) of the child link's frame relative to the parent link's
+            frame. Column 2 is the relative error of the multiplier and the offset in the joint's mimic rule.
     """
 
     links: FloatArray
@@ -197,9 +199,9 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
     An angle error moves each later link by at most the angle times the length of the path to this link.
 
     A stage states the pose A of a joint's frame in one body, and the pose B in the other body. In the zero
-    configuration, the pose of the second body in the first body is A B^-1. Let p be the origin of B, w the
-    sum of the position errors of A and B, and e the sum of the angle errors of A and B. The angle error of A
-    B^-1 is at most e, and the position error at most w + e |p|.
+    configuration, the pose of the second body in the first body is A B^-1. Let p be the origin of B. Let w be
+    the sum of the position errors of A and B. Let e be the sum of the angle errors of A and B. The angle
+    error of A B^-1 is at most e, and the position error of A B^-1 is at most w + e |p|.
 
     - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
       the revolute joint. In `single`, the numbers of the revolute joint include the errors of B. The fixed
@@ -239,10 +241,10 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     most `_TRANSFORM_ROUNDINGS` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
-    - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
-      quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
-      quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t changes by at most 2
-      u sin t. The sum is at most 4 u.
+    - Quaternion: the vector of the four errors is at most u long. The component of this vector perpendicular
+      to the quaternion changes the rotation by at most 2 u. The component parallel to the quaternion changes
+      the length of the quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t
+      changes by at most 2 u sin t. The sum is at most 4 u.
     - Matrix: the nine errors form a vector with a length of at most sqrt(3) u. Normalizing the rows does not
       increase this length. A rotation by a small angle t changes the nine entries by a vector of the length
       sqrt(2) t. The angle error is therefore at most sqrt(3/2) u.
@@ -273,7 +275,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         worst = max(worst[0], off), max(worst[1], angle)
         if share > 1.0:
             what = (
-                f"the prim's pose and the pose by the joints differ by {off:.3g} m"
+                f"the prim's pose and the pose computed from the joints differ by {off:.3g} m"
                 f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(

@@ -1,7 +1,7 @@
 """Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. `Verifier.check` receives a result in the shape that the method
-returns to the user, so the check also finds errors in this shape.
+The oracle receives the user's arguments. `Verifier.check` receives a result in the user's batch shape. The
+check therefore also finds errors in the conversion of a result to the batch shape.
 """
 
 from __future__ import annotations
@@ -72,9 +72,9 @@ class Verifier:
     """Checks the results of one robot and records them.
 
     `known_refusal` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the
-    library that checks the results of the robot's methods. Pinocchio checks tables, the accuracy study and
-    enclosures, whatever the value of `oracle`. If the source is not a URDF, `source_notes` is a text about
-    the conversion to URDF and its check; otherwise `source_notes` is empty.
+    library that checks the results of the robot's methods. Pinocchio always checks tables, the accuracy study
+    and enclosures, even if `oracle` is another library. If the source is not a URDF, `source_notes` is a text
+    about the conversion to URDF and its check; otherwise `source_notes` is empty.
     """
 
     def __init__(
@@ -220,8 +220,9 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that computes one configuration, and checks and records the result.
 
-        The last argument of `compute` is `out`. If `compute` does not support the arguments, or if the oracle
-        cannot check the robot, the returned function returns None without a check.
+        The last argument of `compute` is `out`. `compute` returns None for arguments that `compute` does not
+        support. The returned function then also returns None. If the oracle cannot check the robot, the
+        returned function always returns None.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -254,7 +255,11 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Return the comparison with the oracle's results, and an error if a difference is too large."""
+        """Return the comparison with the oracle's results, and a VerificationError or None.
+
+        If no difference exceeds its bound, the second result is None. Raises RangeError if a number leaves
+        the range of doubles.
+        """
         x = call.select(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -395,8 +400,8 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound on the difference between urdfkin's results and the oracle's.
 
-    The length of a path without prismatic joints is the same in every configuration. For a placement or a
-    Jacobian on a fixed base, such a path has one bound for all configurations.
+    The length of a path without prismatic joints is the same in every configuration. If the base is fixed, a
+    placement or a Jacobian then has the same bound in every configuration.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0

@@ -65,7 +65,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a context in which SVGs contain text as text, and equal figures get equal SVG ids."""
+    """Return a context with urdfkin's settings of matplotlib.
+
+    An SVG contains text as characters instead of outlines. Equal figures have equal ids in SVG files.
+    """
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 

@@ -1,6 +1,7 @@
 """Play a trajectory in the viewer, and save pictures (PNG) and motions (GIF).
 
-The viewer does not interpolate between samples, so it only shows numbers that Pinocchio has checked.
+Pinocchio checks the samples of the trajectory. The viewer does not interpolate between samples, because
+interpolated numbers would be unchecked.
 """
 
 from __future__ import annotations
@@ -26,7 +27,10 @@ _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
-    """The part of a `Viewer` that a `Player` uses; importing `Viewer` would make an import cycle."""
+    """The attributes and methods of a `Viewer` that a `Player` uses.
+
+    This module cannot import `Viewer`, because the module of `Viewer` imports this module.
+    """
 
     server: Any
     robot: Robot

@@ -79,7 +79,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # If fewer than two powers of ten are within the axis, three ticks at other values replace them.
+    # If the range of the axis contains fewer than two powers of ten, the axis gets three other ticks.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -109,7 +109,7 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
-    # The axis is linear below 1, because 1 is the size of one rounding error.
+    # The axis is linear below 1 eps * scale, the size of one rounding error.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -132,7 +132,8 @@ PANELS: dict[str, Panel] = {
 
 #: Suffix that follows "rad" or "m" in the unit of q, v or a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels that draw q, v and a. Each name stands for one panel per unit (rad, m or none).
+#: Names of the panels that draw q, v and a.
+#: Each name selects one panel for each unit of the coordinates: rad, m or no unit.
 COORDINATES = tuple(_PER)
 
 
@@ -157,7 +158,11 @@ def _draw_coordinates(
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Draw the coordinates that change, or all if none changes, and their limits (thin lines)."""
+    """Draw the coordinates in `indices` that change during the trajectory.
+
+    If no coordinate changes, the panel shows all coordinates in `indices`. Thin lines are the limits of the
+    coordinates in the legend.
+    """
     del x
     values: FloatArray = getattr(trajectory, what)
     names = robot.coordinate_names if what == "q" else robot.velocity_names
@@ -186,7 +191,7 @@ def _draw_coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return for each value whether it is outside its limits.
+    """Return an array that is True for each value outside the coordinate's limits.
 
     A double that is next to a limit still counts as inside. This tolerance covers the rounding of a
     limit in decimal notation.
@@ -202,7 +207,8 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: Maximum size of a figure (inches), which fits on a page of A4 or US Letter with a margin.
+#: Width and maximum height of a figure, in inches.
+#: A figure of this size fits on a page of A4 or US Letter with a margin.
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9

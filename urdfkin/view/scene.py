@@ -183,7 +183,10 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the file of a mesh's address in a URDF, or None; a path is relative to the URDF."""
+    """Return the path of the mesh file that an address in a URDF names, or None if there is no such file.
+
+    A relative path in the URDF is relative to the folder of the URDF.
+    """
     candidates = list(_candidates(address, urdf_file))
     try:
         return next((path for path in candidates if path.is_file()), None)

@@ -55,7 +55,7 @@ def has_screen() -> bool:
 
 @contextmanager
 def open_page(address: str) -> Iterator[None]:
-    """Open the address in the user's browser, by a temporary file that redirects to the address."""
+    """Open the address in the user's browser, with a temporary file that redirects to the address."""
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # Only this user can read the folder.
         page = Path(folder) / "view.html"
         page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">', "utf-8")
@@ -65,7 +65,9 @@ def open_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: Headers of every response: they forbid caching, type guessing, embedding, and referrers with the key.
+#: Headers of every response.
+#: The headers forbid caching, guesses of the content type, and embedding in other pages.
+#: The headers also forbid the Referer header, because the page's address contains the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -91,8 +93,9 @@ class RequestFilter:
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
         """Return the reason why a request is refused, or None if the request is allowed.
 
-        `hosts` and `origins` are the values of all Host and Origin headers. `connects` means that the request
-        opens a WebSocket, which needs an Origin; a request for the page has no Origin.
+        `hosts` and `origins` are the values of all Host and Origin headers. `connects` is True if the request
+        opens a WebSocket. Such a request must have an Origin header. A request for the page needs no Origin
+        header.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -143,7 +146,8 @@ def policy(nonce: str, host: str) -> str:
     """Return the Content-Security-Policy header of the viewer's page.
 
     Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
-    can connect only to this server; viser's client would otherwise connect to any server in `?websocket=`.
+    can connect only to this server. Without this rule, viser's client would connect to any server that the
+    parameter `?websocket=` of the address names.
     """
     return "; ".join(
         [
@@ -166,8 +170,9 @@ LOOPBACK = "127.0.0.1"
 #: The only message that the server accepts from a page: a control has changed.
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
-#: The first adds the nonce to viser's script.
-#: This script creates a script element, to which the second replacement adds the nonce.
+#: The first replacement adds the nonce to viser's script.
+#: Viser's script creates another script element.
+#: The second replacement adds the nonce to this script element.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
@@ -218,7 +223,10 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_address(host: str) -> None:
-    """Raise InputError for an address that cannot be listened on; viser would search for a port forever."""
+    """Raise InputError if the server cannot listen on the address `host`.
+
+    Without this check, viser would search for a free port forever.
+    """
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):

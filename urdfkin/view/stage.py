@@ -195,7 +195,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the visual shapes, and return whether the scene also needs the skeleton.
+        """Add the visual shapes, and return whether the scene needs the skeleton.
 
         The scene needs the skeleton if the robot has no shapes, or if a shape cannot be shown.
         """
@@ -273,7 +273,10 @@ class Stage:
             self._set_camera(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new page, and set it again when the panel reduces the view's width."""
+        """Set the camera of a new page.
+
+        While the page opens, the panel reduces the width of the view. The camera is then set again.
+        """
         begin, last_aspect = time.monotonic(), 0.0
 
         def fit(_: Any) -> None:

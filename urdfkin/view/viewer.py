@@ -42,10 +42,12 @@ from urdfkin.view.stage import (
 _UNLIMITED = 100.0
 #: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
-#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten.
+#: Minimum number of steps of a slider for a length.
+#: The size of a step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits.
+#: Largest joint velocity (rad/s, m/s) of a slider if the joint has no velocity limit.
+#: Largest joint acceleration (rad/s^2, m/s^2) of a slider.
 _VELOCITY, _ACCELERATION = 3.0, 5.0
 #: Maximum number of missing meshes that a message names.
 _MOST_MISSING = 5
@@ -55,7 +57,7 @@ _MOST_MISSING = 5
 class SliderRow:
     """A slider for one number of q, v or a.
 
-    `turns` is True if the number is an angle or a derivative of an angle.
+    `is_angle` is True if the number is an angle or a derivative of an angle.
     """
 
     index: int
@@ -135,8 +137,8 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that already has the value is not set again.
-                # A conversion of units could otherwise round the value.
+                # The conversion of units can round a value.
+                # A slider that already has the value is therefore not set again.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -163,7 +165,11 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[SliderRow]:
-    """Describe a slider for each coordinate that can change, within its limits; quaternions have none."""
+    """Return a slider's data for each coordinate that can change.
+
+    The range of a slider is the range between the coordinate's limits. Without limits, the range is from -pi
+    to pi rad, or from -1 to 1 m. The numbers of a quaternion have no sliders.
+    """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -257,7 +263,7 @@ def missing_words(missing: Iterable[Shape]) -> str:
     more = f"\n- and {len(names) - _MOST_MISSING} more" if len(names) > _MOST_MISSING else ""
     packages = any(name.startswith(("package://", "model://")) for name in names)
     remedy = (
-        "Set `ROS_PACKAGE_PATH` to the folder that contains their packages."
+        "Set `ROS_PACKAGE_PATH` to the folder that contains the packages of the meshes."
         if packages
         else "Put the files at the paths in the URDF."
     )

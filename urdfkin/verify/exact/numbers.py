@@ -33,7 +33,7 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Least number of decimal digits in the accuracy study.
 #: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 DIGITS = 50
-#: Number of digits before the additional digit for each joint: twice the 15 decimal digits of a double.
+#: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
@@ -53,8 +53,8 @@ _precision_lock = make_fork_safe_lock()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit. One digit is enough for the growth of the intervals: a
-    joint with an oblique axis makes the intervals only about twice as wide.
+    Each joint on the path to the frame adds one digit. One digit allows for an interval that is ten times as
+    wide. A joint with an oblique axis makes the intervals only about twice as wide.
     """
     return _BASE_DIGITS + joints
 
@@ -77,7 +77,8 @@ def as_interval(value: Number) -> Number:
 
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
-    # This branch saves time, because most numbers of a large robot are the integer 0.
+    # An integer is exact and needs no rounding.
+    # Skipping the rounding saves time, because most numbers of a large robot are the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -117,9 +118,9 @@ def format_decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Conversion, sine and cosine, and square root for one type of number, such as intervals.
+    """Functions of one type of number, such as intervals: conversion, sine and cosine, and square root.
 
-    `number` converts the text of a decimal, or a double, to the type.
+    `number` converts a double, or a decimal as text, to this type of number.
     """
 
     number: Callable[[str | float], Number]
@@ -167,9 +168,9 @@ def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (1 + E) has the same orthogonal factor U as M, and X^T X - 1 = 2 E + E^2. The eigenvalues of E are above
-    -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of each
-    interval.
+    (1 + E) has the same orthogonal factor U as M. Therefore X^T X - 1 = 2 E + E^2. The eigenvalues of E are
+    above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of
+    each interval.
     """
     with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
@@ -220,7 +221,10 @@ def read_exact_joints(
 
 
 def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors of the conversion of decimals to doubles, for the joints on a path and q (n, nq)."""
+    """Return the errors that result from rounding the URDF's decimals to doubles.
+
+    `path` contains the indices of the joints on a path. `q` (n, nq) contains the configurations.
+    """
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
@@ -281,7 +285,10 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C of a mimic joint's value M q + C, where q is the value of the independent joint."""
+        """Return the numbers M and C of a mimic joint.
+
+        The value of the mimic joint is M q + C, where q is the value of the independent joint.
+        """
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":

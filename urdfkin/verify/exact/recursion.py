@@ -29,8 +29,9 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each velocity of a joint: index of the velocity's axis in the child link (0 is x).
-#: The second entry is True for an angular velocity.
+#: Each velocity of a planar or floating joint is a velocity along or about an axis of the child link.
+#: The first entry of a pair is the index of this axis: 0 for x, 1 for y, 2 for z.
+#: The second entry of a pair is True for an angular velocity.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -69,7 +70,9 @@ def compute_motion(
     *,
     base: LinkState | None = None,
 ) -> ExactMotion:
-    """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
+    """Return the motion of the links that `joints` connect, for one sample.
+
+    If `base` is None, the root is fixed.
 
     `joints` is a result of `read_exact_joints`. The order is from the root outwards: a joint comes after its
     parent joint.
