@@ -460,6 +460,17 @@ def test_all_findings_of_a_xacro_file_are_reported_if_a_possible_include_changed
     assert Path("whole.urdf.xacro").read_text() == before
 
 
+@pytest.mark.slow
+def test_all_findings_of_a_new_xacro_file_are_reported(repository: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    settings('include = ["*.urdf.xacro"]')
+    commit()
+    put("new.urdf.xacro", LONG + "<!-- a new file -->")
+    assert found("--changed-since", "HEAD") == [("new.urdf.xacro (expanded)", "URDF503")]
+    commit()
+    assert found("--changed-since", "HEAD") == []
+
+
 @pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
 def test_an_unknown_git_version_is_an_error_with_a_remedy(repository: Path, version: str) -> None:
     err = refused("check", f"--changed-since={version}")

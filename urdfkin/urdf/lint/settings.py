@@ -28,7 +28,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.system.files import exists, is_folder, read_text
+from urdfkin.system.files import exists, is_folder, read_bytes, read_text
 from urdfkin.system.git import CommitFiles
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import Finding, Severity
@@ -267,16 +267,17 @@ def find_known_findings(
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
     An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
-    that it could include has changed. A finding about a missing mesh is new if the text contains the name of
-    a file that was deleted since the older version.
+    that the xacro file could include has changed. A finding about a missing mesh is new if the text contains
+    the name of a file that was deleted since the older version.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # If a file has changed that the xacro file could include, every finding is new.
-        return Baseline(Counter()) if version.has_changes(_INCLUDABLE_SUFFIXES) else None
+        # If the xacro file is new, or if a file that it could include has changed, every finding is new.
+        is_new = not version.contains(read_bytes(path))
+        return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
     old_data = text.data if is_unchanged else version.read_file(path)
     findings = () if old_data is None else examine(replace(text, data=old_data)).findings
