@@ -1,5 +1,6 @@
 """The README, the page "Start" and the tour are correct, and a user's first steps work."""
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -112,6 +113,17 @@ def test_the_readmes_example_runs_and_is_verified() -> None:
     certificate = str(names["robot"].certificate())
     assert masked(certificate) == masked(block("text"))
     assert worst(block("text")) == pytest.approx(worst(certificate), rel=0.5)
+
+
+def test_the_readmes_speeds_are_those_of_the_benchmark() -> None:
+    rows = json.loads((ROOT / "docs" / "performance.json").read_text(encoding="utf-8"))["rows"]
+    jacobians = [row for row in rows if row["quantity"] == "jacobian"]
+    costs = [1 / row["ratio"] for row in jacobians if row["label"] == "urdfkin, verify=True" if row["n"] > 1]
+    speeds = [
+        row["ratio"] for row in jacobians if row["section"] == "batch" and row["label"] == "urdfkin, 1 thread"
+    ]
+    assert f"takes {min(costs):.2f} to {max(costs):.2f} times the time of the loop" in README
+    assert f"one thread is {min(speeds):.0f} to {max(speeds):.0f} times as fast as the loop" in README
 
 
 def test_the_page_of_conventions_has_fast_calls_that_run() -> None:
