@@ -135,7 +135,8 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for computations that urdfkin does not offer. Each value lists the words that get this advice.
+#: Advice for computations that urdfkin does not offer.
+#: Each value lists the words for which urdfkin prints the key, a text with advice.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"

@@ -464,9 +464,9 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat each single row to the length of the longest array.
+    """Repeat the row of each array with one row, so that all arrays have the same number of rows.
 
-    Raise InputError if an array with another number of rows is shorter than the longest array.
+    Raise InputError if an array has neither one row nor as many rows as the longest array.
     """
     import numpy as np
 

@@ -181,9 +181,9 @@ def structure_command(
 ) -> Answer:
     """Find parallel and intersecting axes of an arm, its class (such as SCARA), and solvers for it.
 
-    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm, because the
-    axes of a calibrated arm are never exactly parallel. The deviation is printed. Pinocchio checks the screws
-    of the arm's joints. JSON is in metres and radians.
+    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm. The tolerance
+    is needed because the axes of a calibrated arm are never exactly parallel. The deviation is printed.
+    Pinocchio checks the screws of the arm's joints. JSON is in metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

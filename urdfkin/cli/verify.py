@@ -102,8 +102,8 @@ def verify_command(
     answers each line with a line {"result": [...]}. The file and the program run with your rights.
 
     The command calls the function in the zero configuration, at the joint limits, and in random
-    configurations. If a common mistake explains wrong results, the command names the mistake: a wrong frame,
-    reference frame, joint order, sign or unit, or a missing term.
+    configurations. If a common mistake explains wrong results, the command names the mistake. Examples are a
+    wrong frame, reference frame, joint order, sign or unit, or a missing term.
 
     Exit 0: all results agree. 1: a result disagrees. 2: bad input. 3: the robot cannot be checked.
     """
