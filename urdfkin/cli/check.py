@@ -261,7 +261,9 @@ limit_options = combine(
 )
 @click.option("--fix", is_flag=True, help="Make the automatic fixes in the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Also make fixes that rotate a joint by more than a rounding error."
+    "--unsafe-fixes",
+    is_flag=True,
+    help="With --fix or --diff: include fixes that rotate a joint by more than a rounding error.",
 )
 @click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")

@@ -169,7 +169,13 @@ def vectors_command() -> None:
     help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
     " files of example-robot-data.",
 )
-@samples_option(3, "Number of configurations of each robot; the first one is zero.", minimum=1, maximum=1000)
+@samples_option(
+    3,
+    "Number of configurations of each robot. In the first configuration, each joint is at 0, or at the limit"
+    " nearest to 0.",
+    minimum=1,
+    maximum=1000,
+)
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:

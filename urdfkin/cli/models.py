@@ -53,14 +53,14 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are equivalent but not the same, or if any difference is listed, for"
-    " example of limits or links.",
+    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if joint limits,"
+    " joint types or links differ.",
 )
 @click.option(
     "--within",
     type=NumberInRange(0.0),
-    help="Exit 0 only if urdfkin proves that no frame of B is farther than this (m and rad) from the same"
-    " frame of A.",
+    help="Largest allowed distance (m) and angle (rad) between a frame of A and the same frame of B. The exit"
+    " code is 0 only if urdfkin proves that no distance or angle exceeds this number.",
 )
 @click.option(
     "--boxes",
@@ -73,13 +73,13 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--certificate",
     type=FILE,
-    help="Also write the result to this file as a JSON certificate, which --recheck verifies.",
+    help="Write the result to this file as a JSON certificate. --recheck verifies a certificate.",
 )
 @click.option(
     "--write-map",
     type=FILE,
-    help="Also write the names, order, signs and zero positions of B's joints to this TOML file, for"
-    " --convention.",
+    help="Write the names, order, signs and zero positions of B's joints to this TOML file. The option"
+    " --convention of other commands reads the file.",
 )
 @click.option(
     "--recheck", type=FILE, help="Verify this certificate for A and B instead of comparing them again."

@@ -172,7 +172,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     type=FiniteNumber(),
     metavar="MM",
     help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if the"
-    " error of the tip pose exceeds MM millimetres or MM milliradians.",
+    " position error of the tip exceeds MM millimetres. The command also fails if the orientation error of"
+    " the tip exceeds MM milliradians.",
 )
 @verify_option
 @answer_command(*TEXT_FORMATS, "json")

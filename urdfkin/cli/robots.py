@@ -152,7 +152,7 @@ def _orders(robot: Robot) -> Answer:
         heads = ("joint", *(first for first, *_ in groups.values()))
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
-        title = f"{robot.name}: index of each joint in q, or q/v if its index in v differs"
+        title = f"{robot.name}: index of each joint in q; 7/6 means index 7 in q and index 6 in v"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
     def lines() -> Iterator[list[object]]:
@@ -213,7 +213,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: this conversion changes more than order, factors and zeros; use urdfkin:"
+            yield f"# {letter}: a new order, factors and zeros cannot express this conversion; use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

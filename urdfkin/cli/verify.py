@@ -190,7 +190,7 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
         raise InputError(
             "TARGET must be FILE.py or FILE.py:FUNCTION",
             found=target,
-            remedy="--program checks the command of a program",
+            remedy="to check a program, add --program and give the command that starts the program",
         )
     module = _import_file(path)
     functions = {key: value for key, value in vars(module).items() if callable(value) and key[0] != "_"}

@@ -92,7 +92,8 @@ def view_command(
     if trajectory is not None:
         if start is not None:
             raise click.UsageError(
-                "--q and --trajectory cannot be used together: a trajectory begins at its first sample"
+                "--q and --trajectory cannot be used together: the viewer starts at the first sample of a"
+                " trajectory"
             )
         motion = read_motion(loaded, trajectory, convention)
         if motion.base is not None:
