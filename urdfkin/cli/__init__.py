@@ -61,7 +61,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "models",
             "List the changes between two versions of a robot file and their effect on motion.",
         ),
-        "calibrate": ("calibrate", "Fit a robot's parameters to measured poses and write them to the URDF."),
+        "calibrate": (
+            "calibrate",
+            "Fit a robot's parameters to measured poses, and write a calibrated URDF.",
+        ),
     },
     "Validate against Pinocchio": {
         "validate": (
@@ -135,11 +138,12 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for computations that urdfkin does not offer. Each value lists the words that get this advice.
+#: Advice for computations that urdfkin does not offer.
+#: Each value lists the words for which urdfkin prints the key, a text with advice.
 _ABSENT = _by_word(
     {
-        "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
-        " and `jacobian` compute the pose and the Jacobian that an iterative solver needs":
+        "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm. For an"
+        " iterative solver, `placement` computes the pose, and `jacobian` computes the Jacobian":
             "ik inverse inverse-kinematics solve",
         "urdfkin does not compute dynamics; use Pinocchio (`robot.pinocchio_model()` in Python)":
             "dynamics rnea inertia torque mass-matrix",

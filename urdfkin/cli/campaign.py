@@ -194,7 +194,7 @@ def status(context: click.Context, folder: Path) -> None:
     elif missing:
         say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
-        say("to compute the failed robots again, add `--retry failed` to the `urdfkin validate` command")
+        say("to validate the failed robots again, add `--retry failed` to the `urdfkin validate` command")
     context.exit(3 if missing or failed else 0)
 
 

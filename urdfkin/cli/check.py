@@ -64,11 +64,14 @@ class CheckOutcome:
     Attributes:
         silenced_findings: Findings that a comment in the file suppresses, each with the reason in the
             comment.
-        excerpts: For each finding, the faulty line of the file, and a line with carets below the fault.
+        excerpts: Excerpt of the file for each finding. An excerpt has the faulty line, and a line with carets
+            below the fault.
         known_count: Number of findings that the baseline file suppresses.
-        obsolete_count: Number of entries of the baseline file that no longer have a finding.
+        obsolete_count: Number of findings that the baseline file lists, but that the checked files no longer
+            have.
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
-        with_error: Files with an error. --fix does not change them. A warning with --strict is no error.
+        with_error: Files with a finding of severity error. --fix does not change these files. A warning that
+            --strict reports as an error does not count.
     """
 
     files: list[str] = field(default_factory=list)
@@ -258,7 +261,9 @@ limit_options = combine(
 )
 @click.option("--fix", is_flag=True, help="Make the automatic fixes in the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Also make fixes that rotate a joint by more than a rounding error."
+    "--unsafe-fixes",
+    is_flag=True,
+    help="With --fix or --diff: include fixes that rotate a joint by more than a rounding error.",
 )
 @click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
@@ -280,10 +285,11 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
     A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
-    input. A FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A
-    .xacro file is expanded in a restricted process that can only compute and read the files of its package
-    (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request. Settings are in
-    the table [tool.urdfkin] of pyproject.toml (docs/check.md).
+    input. For a FOLDER, the command checks the *.urdf files in the folder and its subfolders, except hidden
+    subfolders. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a
+    restricted process. This process can only compute and read the files of the package that contains the
+    .xacro file (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
+    Settings are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.
 
@@ -457,7 +463,7 @@ class CheckRun:
         """Return whether a file, and each file that it may include, is the same as in `version`.
 
         Every file of `version` with a suffix in `suffixes` is treated as an included file. A deleted file is
-        treated in the same way if its name occurs in the text.
+        also treated as an included file if the name of the deleted file occurs in the text.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = version.has_changes(suffixes)

@@ -87,8 +87,9 @@ choice_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rule for the offsets along parallel joint axes. last or first: the cell d of the last or first row"
-        " contains their sum. each: the cell d of each row contains the offset of its own link.",
+        "Rule for the offsets along parallel joint axes. last: the cell d of the last row contains the sum of"
+        " the offsets. first: the cell d of the first row contains the sum. each: the cell d of each row"
+        " contains the offset of the row's link.",
     ),
     click.option(
         "--flip",
@@ -137,7 +138,8 @@ compare_options = combine(
     click.option(
         "--fit/--no-fit",
         default=True,
-        help="With --compare: first fit base, tool and joint offsets of the table to ROBOT.",
+        help="With --compare: fit the base, tool, joint offsets and joint signs of the table to ROBOT before"
+        " the comparison.",
     ),
 )
 form_options = combine(

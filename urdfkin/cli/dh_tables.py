@@ -150,7 +150,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
         table = read_table_or_screws(expand_home(request.unchanged))
-        # If the file contains screws, `Robot.dh` derives a table at the end of this function.
+        # If the file contains screws, the call of `Robot.dh` below derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None
@@ -263,7 +263,8 @@ def _better_interpretation(
         return None
     metres = found.metres
     if not found.is_fitted:
-        # `find_better_interpretation` fits every interpretation, also the interpretation of the file.
+        # `find_better_interpretation` needs the tip error after a fit.
+        # With --no-fit, `found.metres` is the tip error without a fit.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None

@@ -41,7 +41,8 @@ class Stop:
 def handle_signals() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
-    # `nohup` makes a process ignore SIGHUP, and a new handler would end this.
+    # `nohup` makes a process ignore SIGHUP.
+    # With a new handler, SIGHUP would stop the process.
     # The new handler therefore replaces only default handlers.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 

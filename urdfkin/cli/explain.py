@@ -65,12 +65,12 @@ def _indent(code: str) -> str:
 def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
-    CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the
-    behaviour of other programs. EQUATION is the number of an equation in the textbook, such as 7.130. Its
-    page has the equation, the function that computes it, and the check of this function. QUESTION is the name
-    of a question, or a word of the name. With another WORD, such as jacobian, the command lists the codes and
-    equations whose description contains the word. Without an argument, the command lists all codes, sections
-    with equations, and questions.
+    CODE is a finding's code or its short name. The page of a finding has the reason, a bad and a good
+    example, and the behaviour of other programs. EQUATION is the number of an equation in the textbook, such
+    as 7.130. The page of an equation has the equation, the function that implements the equation, and the
+    check of this function. QUESTION is the name of a question, or a word of the name. With another WORD, such
+    as jacobian, the command lists the codes and equations whose description contains the word. Without an
+    argument, the command lists all codes, sections with equations, and questions.
 
     \b
     Example:

@@ -100,11 +100,11 @@ def export_command(
 ) -> None:
     """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
 
-    The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
-    expressions are compared with Pinocchio before they are written; the file states how closely they agree.
-    The file also contains test vectors with true values at fifty digits. --check compiles or imports a file
-    and runs its test vectors. You can also run the test vectors without urdfkin. ROBOT is a path, a name that
-    `urdfkin robots` lists, or - for standard input.
+    The robot's constants are part of the code, and each joint's sine and cosine are computed once. urdfkin
+    compares the expressions with Pinocchio before the file is written. The file states the largest
+    disagreement of each quantity. The file also contains test vectors with true values at fifty digits.
+    --check compiles or imports a file and runs its test vectors. You can also run the test vectors without
+    urdfkin. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.
@@ -169,16 +169,22 @@ def vectors_command() -> None:
     help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
     " files of example-robot-data.",
 )
-@samples_option(3, "Number of configurations of each robot; the first one is zero.", minimum=1, maximum=1000)
+@samples_option(
+    3,
+    "Number of configurations of each robot. In the first configuration, each joint is at 0, or at the limit"
+    " nearest to 0.",
+    minimum=1,
+    maximum=1000,
+)
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
 @answer_command()
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, it writes test
-    vectors of the robots of the catalogue and of some 70 small robots. Each small robot tests one feature of
-    URDF. Each robot has a JSON file, and a text file with the same numbers, separated by tabs. The file
-    SHA256SUMS has the digests of all files.
+    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, the command writes
+    test vectors of the robots of the catalogue and of some 70 small robots. Each small robot tests one
+    feature of URDF. Each robot has a JSON file, and a text file with the same numbers, separated by tabs. The
+    file SHA256SUMS has the digests of all files.
 
     The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
     spatial acceleration. The files contain the placement once, and each other quantity in the reference

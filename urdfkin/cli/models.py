@@ -53,14 +53,14 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are equivalent but not the same, or if any difference is listed, for"
-    " example of limits or links.",
+    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if joint limits,"
+    " joint types or links differ.",
 )
 @click.option(
     "--within",
     type=NumberInRange(0.0),
-    help="Exit 0 only if urdfkin proves that no frame of B is farther than this (m and rad) from the same"
-    " frame of A.",
+    help="Largest allowed distance (m) and angle (rad) between a frame of A and the same frame of B. The exit"
+    " code is 0 only if urdfkin proves that no distance or angle exceeds this number.",
 )
 @click.option(
     "--boxes",
@@ -73,13 +73,13 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--certificate",
     type=FILE,
-    help="Also write the result to this file as a JSON certificate, which --recheck verifies.",
+    help="Write the result to this file as a JSON certificate. --recheck verifies a certificate.",
 )
 @click.option(
     "--write-map",
     type=FILE,
-    help="Also write the names, order, signs and zero positions of B's joints to this TOML file, for"
-    " --convention.",
+    help="Write the names, order, signs and zero positions of B's joints to this TOML file. The option"
+    " --convention of other commands reads the file.",
 )
 @click.option(
     "--recheck", type=FILE, help="Verify this certificate for A and B instead of comparing them again."
@@ -109,8 +109,8 @@ def same_command(
 
     A and B are paths, names that `urdfkin robots` lists, or Denavit-Hartenberg tables. A and B are the same
     robot if the screws of all joints and the zero-configuration poses of all links agree. Fixed links, names
-    and the order of joints may differ. A and B are equivalent if they agree after a change of B, for example
-    of its base pose or of the zero position of a joint.
+    and the order of joints may differ. A and B are equivalent if they agree after a change of B. Examples of
+    a change are another base pose of B, or another zero position of a joint of B.
 
     If A and B differ, the command prints two bounds on the largest distance of each frame of B from the same
     frame of A. The command also prints a configuration in which the distance is at least the lower bound. No
@@ -119,9 +119,11 @@ def same_command(
     rounding of its numbers to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
-    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or have
-    differences without effect on motion, such as limits. 2: bad input. With --within, the command does not
-    change B before the comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
+    1: the models are different. 2: bad input. With --strict, the exit code is 1 for models that are
+    equivalent only after changes of B. With --strict, the exit code is also 1 for models with different joint
+    limits, joint types or links. With --within, the command does not change B before the comparison. Exit 0:
+    every frame is proven to be within the given distance. 1: at least one frame is not proven to be within
+    the given distance.
     """
     from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate

@@ -208,15 +208,16 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may name a pose, such as ready, whose values then replace 0.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. Joints without a value"
+        " are then fixed as in this pose, not at 0.",
     ),
     click.option(
         "--joints",
         metavar="NAMES",
         expose_value=False,
         callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Keep only these joints, separated by commas. All others are fixed at 0, or at their --lock"
-        " value.",
+        help="Keep only these joints, separated by commas. Each other joint is fixed at its value in --lock,"
+        " or at 0 without a value.",
     ),
 )
 robot_argument = combine(
@@ -464,9 +465,9 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat each single row to the length of the longest array.
+    """Repeat the row of each array with one row, so that all arrays have the same number of rows.
 
-    Raise InputError if an array with another number of rows is shorter than the longest array.
+    Raise InputError if an array has neither one row nor as many rows as the longest array.
     """
     import numpy as np
 
@@ -548,19 +549,20 @@ _BASE_OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
-        help="Pose of the root link in the world: x,y,z,roll,pitch,yaw (m, rad), x,y,z,qx,qy,qz,qw, or"
-        " @FILE.csv.",
+        help="Pose of the root link in the world, in m and rad. The formats are x,y,z,roll,pitch,yaw and"
+        " x,y,z,qx,qy,qz,qw and @FILE.csv.",
     ),
     "v": click.option(
         "--base-velocity",
         metavar="VALUES",
-        help="Velocity of the root link: vx,vy,vz,wx,wy,wz in the world's axes, m/s and rad/s, or @FILE.csv.",
+        help="Velocity of the root link in the world's axes, in m/s and rad/s. The formats are"
+        " vx,vy,vz,wx,wy,wz and @FILE.csv.",
     ),
     "a": click.option(
         "--base-acceleration",
         metavar="VALUES",
-        help="Classical acceleration of the root link: ax,ay,az,alphax,alphay,alphaz in the world's"
-        " axes, m/s^2 and rad/s^2, or @FILE.csv.",
+        help="Classical acceleration of the root link in the world's axes, in m/s^2 and rad/s^2. The formats"
+        " are ax,ay,az,alphax,alphay,alphaz and @FILE.csv.",
     ),
 }
 

@@ -62,11 +62,11 @@ class Answer:
     Attributes:
         document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
-            array for npy, or the output as text. If `data` has a function for a format in `TEXT_FORMATS`,
-            this function is used instead of `document`.
+            array for npy, or the output as text. `data` may also have a function for a format in
+            `TEXT_FORMATS`. For such a format, the function in `data` replaces `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
         fit_document: Function that returns a document that fits the width of a terminal. None: use
-        `document`.
+            `document`.
     """
 
     document: Callable[[], TextDocument]

@@ -172,7 +172,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     type=FiniteNumber(),
     metavar="MM",
     help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if the"
-    " error of the tip pose exceeds MM millimetres or MM milliradians.",
+    " position error of the tip exceeds MM millimetres. The command also fails if the orientation error of"
+    " the tip exceeds MM milliradians.",
 )
 @verify_option
 @answer_command(*TEXT_FORMATS, "json")
@@ -181,9 +182,9 @@ def structure_command(
 ) -> Answer:
     """Find parallel and intersecting axes of an arm, its class (such as SCARA), and solvers for it.
 
-    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm, because the
-    axes of a calibrated arm are never exactly parallel. The deviation is printed. Pinocchio checks the screws
-    of the arm's joints. JSON is in metres and radians.
+    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm. The tolerance
+    is needed because the axes of a calibrated arm are never exactly parallel. The deviation is printed.
+    Pinocchio checks the screws of the arm's joints. JSON is in metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

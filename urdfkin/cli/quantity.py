@@ -151,8 +151,8 @@ def _format_samples(
 
 
 _ROBOT = (
-    "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The path may also be that"
-    " of a Denavit-Hartenberg table: .toml, .json or .csv."
+    "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may"
+    " also be a Denavit-Hartenberg table: .toml, .json or .csv."
 )
 _breakdown = click.option(
     "--breakdown",
@@ -270,7 +270,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # A table with columns x, y and z needs three numbers in each row. A pose with a quaternion has seven.
+    # A table with columns x, y and z needs three numbers in each row.
+    # A pose with a quaternion has seven numbers.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
@@ -493,13 +494,14 @@ def orientation_labels(representation: str) -> tuple[str, ...]:
 def imu_command(gravity: str, **_: Any) -> Answer:
     """Compute the readings of an accelerometer and a gyroscope on a frame, in the frame's own axes.
 
-    The accelerometer reads the proper acceleration in m/s^2: the second derivative of the frame's position
-    minus gravity. A sensor at rest reads 9.81 upwards. The gyroscope reads the angular velocity in rad/s.
+    The accelerometer reads the proper acceleration in m/s^2. The proper acceleration is the second time
+    derivative of the frame's position, minus the acceleration of gravity. With the default --gravity, an
+    accelerometer at rest reads 9.81 m/s^2 upwards. The gyroscope reads the angular velocity in rad/s.
 
-    The input is a configuration --q with joint velocities --v and joint accelerations --a, a batch of them,
-    or a --trajectory. The motion of the root link is given by --base-velocity and the other --base options,
-    or by arrays in the .npz file. With --root-joint floating, the pose of the root link is part of --q. See
-    `urdfkin explain gravity-in-an-acceleration`.
+    The input is a configuration --q, joint velocities --v and joint accelerations --a. The input may also be
+    a batch of configurations, or a --trajectory. The motion of the root link is given by --base-velocity and
+    the other --base options, or by arrays in the .npz file. With --root-joint floating, the pose of the root
+    link is part of --q. See `urdfkin explain gravity-in-an-acceleration`.
     """
     from urdfkin.robot.trajectory import parse_numbers
 
@@ -535,9 +537,9 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     the singular values. The command also computes the derivative of the manipulability with respect to each
     joint, from the Hessian.
 
-    At a singularity, the command prints the rank, the lost directions and the joints that cause them. The
-    manipulability may have no derivative at a singularity. CSV then contains nan, and JSON contains null.
-    See `urdfkin explain singularity`.
+    At a singularity, the command prints the rank, the lost directions, and the joints that cause the
+    singularity. The manipulability may have no derivative at a singularity. CSV then contains nan, and JSON
+    contains null. See `urdfkin explain singularity`.
 
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.

@@ -116,8 +116,8 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     The argument is the JSON file of `urdfkin validate --json FILE`, or the folder DIR of `--store DIR`. The
     validation may still be running; a validation with missing robots is shown as interrupted.
 
-    The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
-    not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
+    The command ends with the exit code of the validation. 0: everything verified. 1: a disagreement. 2: a
+    robot could not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, read_stored_document
     from urdfkin.validation.document import outcome_of
@@ -169,8 +169,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     If a model changed, the command lists the changes of each joint. A changed model alone is not a
     regression; `urdfkin same` and `urdfkin diff` compute how far the model's frames move.
 
-    Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because its numbers of
-    samples contradict each other.
+    Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because two numbers of
+    samples in the file contradict each other.
     """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document
@@ -202,12 +202,12 @@ def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
 
     The arguments are reports (JSON files), folders of `urdfkin validate --store`, or folders that contain
     both. Runs are ordered by their start. The command identifies a robot by its source (a path or a name of
-    the catalogue). If a file was renamed, the command identifies the robot by its name. Changes and
-    regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
-    an HTML page with charts, which works offline.
+    the catalogue). If a robot's file was renamed, the command identifies the robot by the robot's name.
+    Changes and regressions are defined as in `urdfkin report compare`. With `--output history.html`, the
+    command writes an HTML page with charts, which works offline.
 
-    If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
-    every file was used. 2: a file cannot be used.
+    If a file cannot be used, the command prints the file's name and the reason, and shows the other files.
+    Exit 0: every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import as_html, document, read_history
 

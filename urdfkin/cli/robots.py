@@ -77,10 +77,10 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    The joints have the same order as in q, in v and in the columns of a Jacobian. This is Pinocchio's order;
-    the last line states whether the file has another order. Limits are in rad and rad/s, for prismatic joints
-    in m and m/s. A link that is not indented is a child of the link above it. If a link has several children,
-    lines before their names mark the children.
+    The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
+    order of the joints. The last line states whether the file has another order. Limits are in rad and rad/s,
+    for prismatic joints in m and m/s. A link that is not indented is a child of the link above it. If a link
+    has several children, lines before their names mark the children.
     """
     loaded = load_robot(robot)
     data = {
@@ -128,10 +128,10 @@ _NO_ORDER = (
 def order_command(robot: str, start: str | None, end: str | None) -> Answer:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 
-    For each joint and tool, the table contains the joint's index in q, or both indices if the index in v
-    differs: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With --from or --to, the
-    command prints NumPy code that converts q and v. NAME is a tool from the table; FILE is a TOML file with
-    your own order, signs, units and motor zeros (docs/conventions.md).
+    For each joint and tool, the table contains the joint's index in q. If the joint's index in v differs, the
+    table contains both indices: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With
+    --from or --to, the command prints NumPy code that converts q and v. NAME is a tool from the table; FILE
+    is a TOML file with your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
@@ -152,7 +152,7 @@ def _orders(robot: Robot) -> Answer:
         heads = ("joint", *(first for first, *_ in groups.values()))
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
-        title = f"{robot.name}: index of each joint in q, or q/v if its index in v differs"
+        title = f"{robot.name}: index of each joint in q; 7/6 means index 7 in q and index 6 in v"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
     def lines() -> Iterator[list[object]]:
@@ -213,7 +213,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: this conversion changes more than order, factors and zeros; use urdfkin:"
+            yield f"# {letter}: a new order, factors and zeros cannot express this conversion; use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

@@ -98,10 +98,10 @@ def _frames(word: str) -> Iterator[str]:
 def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script for a shell.
 
-    The script completes commands, options and the choices of options. It also completes robots, files, the
-    frames of the robot on the command line, reference tables, codes of findings and numbers of equations.
-    Frames are read from a URDF or MJCF file; a .xacro file is not expanded. To activate the script, add the
-    line for your shell to its startup file:
+    The script completes commands, options and the choices of options. The script also completes robots,
+    files, the frames of the robot on the command line, reference tables, codes of findings and numbers of
+    equations. Frames are read from a URDF or MJCF file. A .xacro file is not expanded. To activate the
+    script, add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"

@@ -114,8 +114,8 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of an unfinished line that is stored whole.
-#: The next piece of text may complete a CI command that begins in this line.
+#: Maximum length of an unfinished line that is stored completely.
+#: A line is stored because the next piece of text may complete a CI command that begins in the line.
 _MAX_STORED = 64
 
 
@@ -153,7 +153,7 @@ class SafeStream:
         self.stream.buffer.flush()
 
     def escape_file(self, text: str) -> str:
-        """Return the text that `write_file` writes for `text`.
+        """Escape control characters and CI commands in `text`, as `write_file` does.
 
         A carriage return at the end of a line is not escaped.
         """
@@ -168,7 +168,7 @@ class SafeStream:
         self.stream.write(text)
 
     def _without_commands(self, text: str) -> str:
-        """Escape CI commands, including commands that are written in several pieces."""
+        """Escape CI commands in `text`, including a command that begins in an earlier text."""
         first, *rest = text.split("\n")
         lines = [self._line_without_commands(first)]
         for line in rest:

@@ -52,8 +52,8 @@ def study_all(
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
     `given` are the validated robots, and `report` is their validation report. `how` are arguments of `load`.
-    `shard` is a part of the validation, for example "1/4". With `shard`, only robots whose first samples
-    belong to this part are studied. An interrupt skips the remaining robots.
+    `shard` is a part of the validation, for example "1/4". With `shard`, a robot is studied only if the
+    robot's first sample belongs to the given part. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Chunking
@@ -85,7 +85,10 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyStore | None]:
-    """Lock the results in `folder`, or only those of `shard`, and yield the stored accuracy results."""
+    """Lock the store in `folder`, and yield the accuracy results in the store.
+
+    With `shard`, only the results of the given part are locked.
+    """
     if folder is None:
         yield None
         return

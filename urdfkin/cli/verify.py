@@ -102,8 +102,8 @@ def verify_command(
     answers each line with a line {"result": [...]}. The file and the program run with your rights.
 
     The command calls the function in the zero configuration, at the joint limits, and in random
-    configurations. If a common mistake explains wrong results, the command names the mistake: a wrong frame,
-    reference frame, joint order, sign or unit, or a missing term.
+    configurations. If a common mistake explains wrong results, the command names the mistake. Examples are a
+    wrong frame, reference frame, joint order, sign or unit, or a missing term.
 
     Exit 0: all results agree. 1: a result disagrees. 2: bad input. 3: the robot cannot be checked.
     """
@@ -190,7 +190,7 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
         raise InputError(
             "TARGET must be FILE.py or FILE.py:FUNCTION",
             found=target,
-            remedy="--program checks the command of a program",
+            remedy="to check a program, add --program and give the command that starts the program",
         )
     module = _import_file(path)
     functions = {key: value for key, value in vars(module).items() if callable(value) and key[0] != "_"}

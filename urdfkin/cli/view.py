@@ -66,10 +66,10 @@ def view_command(
 ) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q. Without --q, it starts in the configuration nearest to zero that is within the
-    joint limits. The viewer shows the position, velocity and other numbers of the frame that you choose.
-    Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package viser.
-    Ctrl-C stops it.
+    The viewer starts at --q. Without --q, the viewer starts in the configuration nearest to zero that is
+    within the joint limits. The viewer shows the position, velocity and other numbers of the frame that you
+    choose. Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package
+    viser. Ctrl-C stops the viewer.
 
     With --trajectory, the viewer plays the samples of a CSV or .npz file. With --convention, the input field
     of q accepts and shows values in that convention.
@@ -92,7 +92,8 @@ def view_command(
     if trajectory is not None:
         if start is not None:
             raise click.UsageError(
-                "--q and --trajectory cannot be used together: a trajectory begins at its first sample"
+                "--q and --trajectory cannot be used together: the viewer starts at the first sample of a"
+                " trajectory"
             )
         motion = read_motion(loaded, trajectory, convention)
         if motion.base is not None:
@@ -188,7 +189,7 @@ def plot_command(
     The plot has panels for q, v and a with their limits, and for the frame's position, velocity and
     acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
     check. --trajectory reads a CSV or .npz file. --to makes a straight line in joint space that begins and
-    ends at rest; a floating base moves along a screw. With --convention, the file and the values of --from
+    ends at rest. A floating base moves along a screw. With --convention, the file and the values of --from
     and --to are in that convention. The panels always show the joint values of the URDF, in rad and m.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.

@@ -17,8 +17,8 @@ joint (7.110). A difference of two positions in the world would lose digits if t
 world's origin or has a long link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
-planar or floating joint has one more Coriolis term, because the joint's axes of translation rotate. The term
-is o x s for the linear velocity s and the angular velocity o of the joint.
+planar or floating joint has an additional Coriolis term, because the joint's axes of translation rotate. The
+additional term is o x s for the linear velocity s and the angular velocity o of the joint.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: The kinds of contribution, in the order of the array `terms`.
+#: Kinds of acceleration that a joint contributes, in the order of `AccelerationBreakdown.terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 _MAX_DISPLAYED = 2
 

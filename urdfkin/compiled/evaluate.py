@@ -1,8 +1,9 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
 Inputs have the shapes (n, nq) and (n, nv). `urdfkin.robot` checks the shapes; the functions of this module do
-not. A few configurations are computed with Python numbers, and more configurations by a compiled kernel
-(`preload`). Results are exactly the same doubles for each method and for any number of threads.
+not. Small batches are computed with Python numbers, and large batches by a compiled kernel. The module
+`preload` decides when a kernel is used. Results are exactly the same doubles for each method and for any
+number of threads.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: Results of at least this many bytes do not fit into the caches and are written directly to memory.
 _MIN_BUFFERED_BYTES = 2 << 20
-#: Maximum number of doubles in the buffer of results; they fill half of the first-level cache.
+#: Maximum number of doubles in the buffer of results.
+#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_SIZE = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -178,9 +180,10 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch without a kernel; return None as soon as `preload` provides a kernel.
+    """Compute a batch with Python numbers, without a kernel.
 
-    Otherwise, return 1 if an input is nan, infinite or too large, else 0.
+    The result is None if `preload` provides a kernel before the batch is complete. For a complete batch, the
+    result is 1 if an input is nan, infinite or too large, else 0.
     """
     if preload.get_kernel(name) is not None:
         return None

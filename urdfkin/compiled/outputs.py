@@ -1,7 +1,7 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-A function `mask_...` marks the vectors of a link's state that an output does not need. Jacobian columns are
-computed in world axes; for LOCAL they are rotated to the axes of the frame.
+The state of a link consists of vectors. A function `mask_...` marks the vectors that an output does not need.
+Jacobian columns are computed in world axes. For LOCAL, the columns are rotated to the axes of the frame.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def mask_for_velocity(state):
 
 
 def mask_for_acceleration(state):
-    """Mark the linear velocity as unused, because acceleration (7.130) does not depend on it."""
+    """Mark the linear velocity as unused, because acceleration (7.130) does not depend on this velocity."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -73,7 +73,8 @@ def _store_pose_row(s, row, x, last):
 
 def write_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # The reference point is the point of the body at the world's origin.
+    if reference == _WORLD:
+        # The result is the velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
     _write_six_vector(m, s, program, place, b, vel, w, to)
 

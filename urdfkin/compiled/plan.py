@@ -1,8 +1,9 @@
 """A robot's tree as arrays, and as a program: the list of instructions that a kernel executes.
 
 A moving joint is called a step. As in the textbook, every joint frame is rotated so that the joint's axis is
-z: a revolute joint is then Rz, and a prismatic joint is Tz. Fixed joints are merged into the constant offsets
-between moving joints. At a branch of the tree, a program saves the state of a link to memory.
+z. A revolute joint then rotates about z, and a prismatic joint translates along z. Fixed joints are merged
+into the constant offsets between moving joints. At a branch of the tree, a program saves the state of a link
+to memory.
 """
 
 from __future__ import annotations
@@ -64,8 +65,9 @@ _MOTION = {
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
-#: Motions of each kind of joint. The integer of a motion is the index of its axis in the joint's frame.
-#: The other entry of a motion is True for a rotation, and False for a translation.
+#: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
+#: The numbers 0, 1 and 2 of `axis` are the axes x, y and z of the joint's frame.
+#: `is_rotation` is True for a rotation about the axis, and False for a translation along the axis.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -84,21 +86,24 @@ class CompiledTree:
         joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers; `StepField` names the three columns.
         geometry: (steps, 14); `Geometry` gives the first column of each quantity.
-        frames: (frames, 2) row in `steps` of the last moving joint before the frame, and the frame's index in
-            the output. The row is -1 if no moving joint precedes the frame. The frames are sorted by this
-            row.
-        offsets: (frames, 12) rotation matrix and translation of each frame, relative to its last moving
-            joint, in the order of `frames`.
+        frames: (frames, 2) two integers for each frame. The first integer is the row of the frame's last
+            moving joint in `steps`, or -1 if no joint moves the frame. The second integer is the frame's
+            index in the output. The frames are sorted by the first integer.
+        offsets: (frames, 12) rotation matrix and translation of each frame, relative to the frame's last
+            moving joint, in the order of `frames`.
         columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
-        multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
+        multipliers: (columns,) factor of each Jacobian column. The factor is the multiplier in the joint's
+            mimic rule, or 1 if the joint has no mimic rule.
         sum_columns: (frames, columns) index of the column to which each Jacobian column is added; -1 if the
             column's joint does not move the frame. The columns of a joint and of its mimic joints are added
-            to the first of these columns on the path to the frame.
+            together. The sum is stored in the column of the joint that comes first on the path to the frame.
         q_indices: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
-        lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints. The first
-            elements sum the offsets between the previous moving joint and each moving joint. The other
-            elements sum the offsets between the last moving joint and each frame, in the order of `frames`.
+        lengths: (steps + frames,) lengths (m) of paths. The length of a path is the sum of `Joint.length`
+            over the joints on the path, including fixed joints. The first elements belong to the moving
+            joints. The path to a moving joint begins at the previous moving joint. The last elements belong
+            to the frames, in the order of `frames`. The path to a frame begins at the frame's last moving
+            joint.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
             output order.
@@ -283,9 +288,10 @@ def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[
 class Op(IntEnum):
     """Instructions of a program.
 
-    TRANSLATE is a constant translation in any direction, and ROTATE is a constant rotation about any axis.
-    The suffix X, Y or Z names a coordinate axis; these instructions are faster. STORE_AXIS stores the data
-    that the Jacobian column of a joint needs.
+    TRANSLATE is a constant translation in any direction, and ROTATE is a constant rotation about any axis. An
+    instruction with the suffix X, Y or Z translates along this coordinate axis or rotates about this axis.
+    Instructions with a suffix are faster. STORE_AXIS stores the data that the Jacobian column of a joint
+    needs.
     """
 
     END = 0
@@ -311,9 +317,10 @@ class Op(IntEnum):
 class ProgramHeader(IntEnum):
     """Indices of the integers at the beginning of a program, before the instructions.
 
-    CODE is the index of the first instruction. BLOCKS_Q, BLOCKS_V and BLOCKS_END delimit the lists of blocks
-    of eight coordinates or velocities. ANGLES and ANGLES_END delimit the list of joint angles. The inputs q,
-    v, a and the base's state begin at the scratch rows Q, V, A and BASE.
+    CODE is the index of the first instruction. Inputs are read in blocks of eight numbers. The list of the
+    blocks of q begins at BLOCKS_Q. The list of the blocks of v begins at BLOCKS_V and ends before BLOCKS_END.
+    The list of joint angles begins at ANGLES and ends before ANGLES_END. The inputs q, v, a and the base's
+    state begin at the scratch rows Q, V, A and BASE.
     """
 
     CODE = 0
@@ -346,7 +353,8 @@ ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Number of integers for one Jacobian column in a Hessian.
 #: The first two integers are the scratch row of the column, and the joint's row in `steps`.
-#: The other two are the joint's index in v, and the scratch row of the running sum.
+#: The last two integers are the joint's index in v, and the first scratch row of a sum.
+#: The sum adds up derivatives with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -466,7 +474,7 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state after joint `step` if an event later than event `following` needs this state."""
+        """Save the state after joint `step` if an event with an index above `following` needs this state."""
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
 
@@ -547,7 +555,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each element of the frame's (6, nv) matrix.
+        """Return the index of the scratch row that contains each element of the frame's (6, nv) matrix.
 
         The six numbers of Jacobian column c begin at the scratch row `row + COLUMN_ROWS * c`.
         """
@@ -578,7 +586,10 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight consecutive indices that contains one of `indices`."""
+    """Return the first index of each block that contains at least one of `indices`.
+
+    A block consists of eight consecutive indices, and begins at a multiple of eight.
+    """
     return sorted({int(index) // 8 * 8 for index in indices})
 
 

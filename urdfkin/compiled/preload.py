@@ -1,8 +1,8 @@
 """Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
 For a few configurations, Python is faster than loading or compiling a kernel. For each kernel, this module
-therefore adds up the seconds that Python computed without the kernel. The time in the table also includes an
-estimate for the next computations.
+therefore adds up the time (s) of computations without the kernel. The time in the table also includes the
+estimated time of the next computations.
 
 | time without a kernel | action |
 |---|---|
@@ -30,7 +30,8 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: Computing times (s) without a kernel. The table in the module's docstring says what follows each time.
+#: Thresholds (s) for the computing time without a kernel.
+#: The table in the module's docstring lists the action for each threshold.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: This threshold (s) applies instead of `LOAD_AFTER` after the first kernel is loaded.
 _LOAD_NEXT_AFTER = 0.03
@@ -96,8 +97,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single(name: str) -> bool:
     """Return whether to load the function that computes one configuration with the kernel `name`.
 
-    If the kernel is loaded and `use_only` is not active, each call of `should_load_single` counts as
-    `_SECONDS_SAVED` seconds that were lost without the function.
+    If the kernel is loaded and `use_only` is not active, each call of `should_load_single` adds
+    `_SECONDS_SAVED` to a sum. The sum is the time (s) that the function could have saved.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -117,7 +118,10 @@ def load_kernel(name: str, module: str = KERNELS_MODULE) -> Any:
 
 
 def _is_on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk; search again only after `_SEARCH_INTERVAL` seconds."""
+    """Return whether a kernel is on disk.
+
+    For `_SEARCH_INTERVAL` seconds after a search without success, return False without a new search.
+    """
     folder = kernel_cache_folder()
     if folder is None or time.monotonic() < _next_search.get((folder, name), 0.0):
         return False
@@ -129,7 +133,8 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Code that ends the second process when its standard input closes, that is, when this process ends.
+#: Python code for the second process: the process ends when its standard input closes.
+#: The standard input closes when the first process ends.
 _EXIT_WITH_PARENT = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
@@ -186,7 +191,10 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Close the second process's standard input in a forked child, so that only the parent keeps it open."""
+    """Close a forked child's copy of the pipe to the second process.
+
+    The pipe then stays open only in the parent process.
+    """
     for process in _background.values():
         process.returncode = 0
         _close(process)
@@ -205,7 +213,10 @@ def all_kernels_on_disk() -> bool:
 
 
 def load_all_kernels() -> None:
-    """Load every kernel before several processes start, so that not every process compiles all kernels."""
+    """Load or compile the kernels of both groups before several processes start.
+
+    The processes then need not compile these kernels.
+    """
     missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_GROUP))
     compiler = _start_compiler(_SECOND_GROUP) if missing else None
     try:

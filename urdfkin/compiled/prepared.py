@@ -43,13 +43,13 @@ class _PreparedRobot(Protocol):
 
 
 class PreparedFrame:
-    """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
+    """Fast computation of the quantities of one frame, such as the Jacobian, in one reference frame.
 
-    Results are exactly the same numbers as those of `Robot`. With `verify=True`, urdfkin compares each result
-    with Pinocchio's result and uses the tolerance of `Robot`. With `verify=False`, results are not
-    checked, and `Robot.certificate` reports them as unchecked. Contiguous float64 arrays are used directly.
-    For arguments of other types, `Robot` computes the result or raises the error. Several threads may share
-    one object, also on free-threaded Python.
+    `Robot.prepare` creates the object. Results are exactly the same numbers as those of `Robot`. With
+    `verify=True`, urdfkin compares each result with Pinocchio's result and uses the tolerance of `Robot`.
+    With `verify=False`, results are not checked, and `Robot.certificate` reports them as unchecked.
+    Contiguous float64 arrays are used directly. For arguments of other types, `Robot` computes the result or
+    raises the error. Several threads may share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -91,7 +91,8 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether `Robot.prepare` created this object. If so, the first call loads or compiles machine code.
+        #: Whether `Robot.prepare` created this object.
+        #: The first call of an object from `Robot.prepare` loads or compiles machine code.
         self.always_load = False
         # `_compute_first` creates the function of a quantity and assigns this function to the attribute.
         self._placement: FastFunction = partial(self._compute_first, "placement")

@@ -1,7 +1,7 @@
 """Number types for the recursion of one configuration in plain Python, without compilation.
 
-Results are exactly the same doubles as those of compiled kernels, which use the types of
-`urdfkin.compiled.machine.numbers`.
+Compiled kernels use the number types of `urdfkin.compiled.machine.numbers`. Results with and without
+compilation are exactly the same doubles.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return `math.fma`, but with inf and nan where Python raises an error."""
+    """Return a fused multiply-add that gives inf or nan if `math.fma` raises an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -225,7 +225,7 @@ def load_constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-broadcast = Number  # Compiled code copies one double to all configurations of a block.
+broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
 
 
 def array_data(array: Any) -> Any:
@@ -233,7 +233,7 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`. In compiled code, the function with this name returns a pointer."""
+    """Return the list `address`. The compiled `doubles_at` converts an address to a pointer."""
     return address
 
 
@@ -261,7 +261,7 @@ def is_in_range(total: Number) -> bool:
 
 
 def wait_for_writes(*_: object) -> None:
-    """Do nothing; the function of this name in compiled code waits until all results are in memory."""
+    """Do nothing. The compiled `wait_for_writes` waits until all results are in memory."""
 
 
 stream = wait_for_writes

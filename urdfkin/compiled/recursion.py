@@ -19,8 +19,9 @@ world axes. The joint axis and the interorigin vector have constant components i
 The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
 add the rounding errors of another rotation.
 
-A vector that a result does not need is `unused()` and costs no time. `urdfkin.compiled.machine.kernels`
-compiles copies of these functions with Numba's number types.
+The placeholder `unused()` replaces each vector that a result does not need. In a kernel, operations with the
+placeholder take no time. `urdfkin.compiled.machine.kernels` compiles copies of these functions with Numba's
+number types.
 """
 
 from __future__ import annotations
@@ -191,7 +192,10 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(s, row, g, c, is_mimic):
-    """Return a joint's value; a mimic rule's product and sum are rounded separately, as in Pinocchio."""
+    """Return a joint's coordinate.
+
+    The product and the sum of a mimic rule are rounded separately, as in Pinocchio.
+    """
     x = load_number(s, row)
     if is_mimic:
         x = round_product(load_constant(g, c) * x) + load_constant(g, c + 1)
@@ -293,11 +297,12 @@ def _restore_state(s, row, state):
 
 
 def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
+    """Read q, v or a of `m` configurations into scratch memory, in blocks of eight numbers.
 
-    A whole block is read faster than a part of a block. The last block of a configuration may therefore
-    contain surplus numbers of the next configuration. Inputs that are read later may overwrite the surplus
-    numbers. No instruction uses the other surplus numbers.
+    `blocks` contains the first index of each block that the recursion needs. A whole block is read faster
+    than a part of a block. The last block of a configuration may therefore contain surplus numbers of the
+    next configuration. Inputs that are read later may overwrite surplus numbers. No instruction uses the
+    surplus numbers that remain.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -371,9 +376,10 @@ def _execute_transform(axes, op, state, g, c):
 def _execute_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The scratch rows of the joint's velocity and acceleration are `v` and `a`. For a revolute joint, `x` is
-    the scratch row of the sine; for other joints, `x` is the row of the first coordinate. For a planar joint,
-    `z` is the scratch row of the sine. For a revolute or prismatic joint, `z` is 1 if a mimic rule changes
+    The scratch row `v` contains the joint's velocity, and the scratch row `a` contains the joint's
+    acceleration. For a revolute joint, the scratch row `x` contains the sine of the joint angle. For other
+    joints, the scratch row `x` contains the first coordinate. For a planar joint, the scratch row `z`
+    contains the sine of the joint angle. For a revolute or prismatic joint, `z` is 1 if a mimic rule changes
     the coordinate, else 0. The constants of the mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
@@ -449,8 +455,8 @@ def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, sto
 def forward_recursion(address, axes, orders, mask, store, column, write):
     """Execute a program for every block; return 1 if an input is nan, infinite or too large, else 0.
 
-    The address is that of the kernel's arguments (`KernelArgs`). The number `orders` is 1 for q, 2 for q and
-    v, and 3 for q, v and a. `mask`, `store`, `column` and `write` are functions of
+    `address` is the address of the kernel's arguments, which `KernelArgs` describes. The number `orders` is 1
+    for q, 2 for q and v, and 3 for q, v and a. `mask`, `store`, `column` and `write` are functions of
     `urdfkin.compiled.outputs`.
     """
     args = integers_at(address)

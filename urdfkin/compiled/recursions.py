@@ -1,10 +1,11 @@
-"""One forward recursion for each quantity, in Python; `urdfkin.compiled.machine.kernels` compiles copies.
+"""Forward recursions in Python, one function for each quantity.
 
 The equations are 7.77 (positions of frames), 7.127 and 7.128 (velocities), 7.129 and 7.130 (accelerations),
 7.85 (Jacobians) and 7.126 (Jacobian rates). Functions `local_...` compute in each frame's own axes.
 
-The argument of a kernel is the address of the integers that `KernelArgs` describes; Python code passes lists
-instead of addresses. The result is 1 if an input is nan, infinite or too large, else 0.
+`urdfkin.compiled.machine.kernels` compiles a copy of each function. The copy is called a kernel. The argument
+of a kernel is the address of the integers that `KernelArgs` describes. Python code passes lists instead of
+addresses. The result is 1 if an input is nan, infinite or too large, else 0.
 """
 
 from __future__ import annotations

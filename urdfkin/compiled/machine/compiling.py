@@ -41,8 +41,8 @@ _dumps: Any = dumps
 class KernelCache(_NullCache):  # type: ignore[misc]
     """The disk cache of one function, which Numba reads before a compilation and writes afterwards.
 
-    A function's source file may be in another package. The name of the cache file therefore depends on the
-    text of that source file too.
+    A function's source file may be in another package. The name of the cache file therefore also depends on
+    the text of the function's source file.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
@@ -55,7 +55,8 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # An undamaged file may come from another version of Numba; reading it can cause any error.
+            # An undamaged file may come from another version of Numba.
+            # Reading such a file can cause any error.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
         self._begin()
@@ -212,7 +213,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # No `cached_property` is used, because before Python 3.12 its lock could stay locked after a fork.
+        # This method replaces a `cached_property`.
+        # Before Python 3.12, the lock of a `cached_property` could stay locked after a fork.
         if name != "compiled_function":
             raise AttributeError(name)
         with compile_lock:

@@ -2,7 +2,8 @@
 
 In an array, all numbers of one configuration are adjacent. Scratch memory consists of rows of `LANES`
 doubles; a row contains one quantity for all eight configurations. The transfer is therefore a transposition.
-Shuffle instructions transpose blocks of eight, four, two or one numbers of each configuration.
+A block contains 8, 4, 2 or 1 numbers of each of the eight configurations. Shuffle instructions transpose a
+block.
 """
 
 from __future__ import annotations
@@ -105,7 +106,8 @@ def _make_pointer_function(kind: Any) -> Any:
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
-#: Maximum number of doubles that are prefetched; they fill half of the first-level cache.
+#: Maximum number of doubles that are prefetched.
+#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_PREFETCHED = 3072
 
 
@@ -286,8 +288,8 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add to `total` the squares of `count` numbers that begin at `x[at]`.
 
-    If `count` is not a multiple of eight, each remaining number is added to all eight partial sums. This is
-    harmless, because the sum is only compared with a very large bound.
+    If `count` is not a multiple of eight, each remaining number is added to all eight partial sums. Adding a
+    number eight times is harmless, because the total is compared only with a very large bound.
     """
     # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
@@ -339,8 +341,8 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    A processor reads a cache line before it writes a part of the line, but not before it writes the whole
-    line. `address` is the address of `to[0]`.
+    To write a part of a cache line, a processor must first read the line. To write a whole cache line, a
+    processor need not read the line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

@@ -131,7 +131,10 @@ def _is_constant(kind: Any, value: int | None) -> bool:
 
 
 def _are_supported(*kinds: Any) -> bool:
-    """Return whether all types are integers or types of this module, and at least one is of this module."""
+    """Return whether this module supports an operation on these types.
+
+    At least one type must be a number type of this module. The other types may also be integer types.
+    """
     ours = [isinstance(kind, Lanes | Product | ConstantNumber) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)

@@ -1,12 +1,12 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
-rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
-k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the method subtracts multiples of two doubles whose
-sum is nearly pi/2. Two doubles are enough because the subtraction uses fused multiply-adds. Near a multiple
-of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27. The C library
-computes the sine and the cosine of larger angles. Only the larger angles of a vector use the C library.
-Otherwise, the result of a configuration would depend on the other configurations in the vector.
+Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the difference is in [-pi/4,
+pi/4]. The code also computes the rounding error of this subtraction. The polynomials come from fdlibm (Sun
+Microsystems, k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the method subtracts multiples of two
+doubles whose sum is nearly pi/2. Two doubles are enough because the subtraction uses fused multiply-adds.
+Near a multiple of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27.
+The C library computes the sine and the cosine of larger angles. Only the larger angles of a vector use the C
+library. The result of a configuration therefore does not depend on the other configurations in the vector.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         r_error = build_fma(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_error = build_fma(builder, r, r, builder.fneg(z))
-        # The variable `leading` is 1 - z/2, which begins the cosine's series; `leading_error` is its error.
+        # The variable `leading` is 1 - z/2, the beginning of the cosine's series.
+        # The variable `leading_error` is the rounding error of `leading`.
         leading = build_fma(builder, z, all_lanes(-0.5), all_lanes(1.0))
         leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
         # To first order, sin(r + r_error) = sin r + r_error cos r.
@@ -91,7 +92,8 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
         # An odd number of quarter turns exchanges sine and cosine.
-        # The sine changes its sign if the quarter turns modulo 4 are 2 or 3, and the cosine if 1 or 2.
+        # The sine changes its sign if the number of quarter turns modulo 4 is 2 or 3.
+        # The cosine changes its sign if the number of quarter turns modulo 4 is 1 or 2.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             apply_sign(builder.select(odd, cosine, sine), quarters),
@@ -104,7 +106,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Return whether an element of the vector x is nan, or an angle of at least 2^20 quarter turns."""
+    """Return whether a vector contains nan, or an angle x with |x| of at least 2^20 quarter turns."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments

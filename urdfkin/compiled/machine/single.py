@@ -1,13 +1,15 @@
-"""Compute one configuration with compiled functions that Python calls like built-in functions.
+"""Make compiled functions that compute a quantity for one configuration.
 
-In a call through Numba, checking the arguments takes as long as the recursion itself. CPython only passes the
-addresses of the arguments to a built-in function. The compiled function reads a few 8-byte words of each
-array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
-interpreter lock for about a microsecond. For unsupported arguments, the function returns None.
+Python calls a compiled function as a built-in function. In a call through Numba, checking the arguments would
+take as long as the recursion itself. CPython passes the addresses of the arguments to a built-in function,
+and does not check the arguments. The compiled function reads a few 8-byte words of each array object, at the
+offsets that CPython and NumPy guarantee to C code. The function holds Python's global interpreter lock for
+about a microsecond. For unsupported arguments, the function returns None.
 
-A call sets a flag while it uses its scratch memory. One atomic operation sets the flag, so the flag is also
-safe in a Python without a global interpreter lock. If another thread is using the scratch memory, the
-function also returns None. The caller then computes the result in another way.
+The compiled function sets a flag before using scratch memory, and clears the flag afterwards. One atomic
+operation sets the flag, so the flag is safe even in a Python without a global interpreter lock. If another
+thread is using the scratch memory, the compiled function returns None. If the compiled function returns None,
+the caller computes the result in another way.
 """
 
 from __future__ import annotations
@@ -61,7 +63,8 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
 #: This word contains the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.
+#: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.
+#: `_WRITABLE` has NumPy's flags of an output array: C-contiguous, aligned and writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -102,7 +105,11 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of an array's doubles; 0 if the object has another type, shape or flags."""
+    """Return the address of the doubles of an array; return 0 for an object that is not as expected.
+
+    The expected object is an array of doubles with the flags `flags` and `axes` axes. The first axis has the
+    length `rows`, and each other axis has the length `columns`.
+    """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
@@ -120,10 +127,11 @@ def one_configuration(bound, arguments, count):
     """Compute the result for one configuration; return None if the arguments are not supported.
 
     The function also returns None if another thread is using the scratch memory, or if an input is nan,
-    infinite or too large. `arguments` is the address of `count` arguments: first q, or q and v, or q, v and
-    a, and then the output array or None. `bound` is the address of a tuple. The tuple begins with the array
-    of kernel arguments, NumPy's array type and None. The next items are the function that creates the result
-    array, and the shape of the result array. The other items are objects that must stay alive.
+    infinite or too large. `arguments` is the address of `count` arguments. The first arguments are q, or q
+    and v, or q, v and a. The last argument is the output array or None. `bound` is the address of a tuple.
+    The tuple begins with the array of kernel arguments, NumPy's array type and None. The next two items of
+    the tuple are the function that creates the result array, and the shape of the result array. The last
+    items of the tuple are objects that must stay alive as long as the compiled function.
     """
     items, inputs = integers_at(bound), integers_at(arguments)
     address, ndarray, none = integers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -203,8 +211,8 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: For each quantity: the kernel, the kernel for LOCAL, and the number of inputs.
-#: The last number is the number of axes of the result array that have the length nv.
+#: The entry of a quantity has the kernel, the kernel for LOCAL, and the number of inputs (q, v and a).
+#: The last number of an entry counts the axes of length nv in the result array.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
