@@ -2,8 +2,8 @@
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
 first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
-has the name of its link or joint; the prefix `link:` or `joint:` is needed if a link and a joint have equal
-names.
+has the name of its link or joint. If a link and a joint at different places have the same name, the prefix
+`link:` or `joint:` is needed.
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ class Limit:
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
-#: The excess must also be more than `_FAR_FRACTION` times the joint's range.
+#: The value must also exceed this limit by more than `_FAR_FRACTION` times the joint's range.
+#: If a limit is missing, each value that exceeds the other limit is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
@@ -371,9 +372,9 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
-        A link or joint with exactly this name has priority. Otherwise `link:NAME` selects the link and
-        `joint:NAME` the joint. An unknown name raises UnknownNameError; a name of a link and of a joint at
-        different places raises InputError.
+        A link or joint with exactly this name has priority. If no link or joint has this name, `link:NAME`
+        selects the link NAME, and `joint:NAME` selects the joint NAME. An unknown name raises
+        UnknownNameError. A name that a link and a joint at different places share raises InputError.
         """
         if not isinstance(name, str):
             raise InputError(
