@@ -77,9 +77,9 @@ class RangeReduction:
         names = ", ".join(self.mimic_joints)
         own = f"joint {self.joint} ranges over {format_range(self.joint_range)} {self.unit}"
         if self.allowed_range is None:
-            return f"{own}; at most one value keeps all its mimic joints within their limits ({names})"
+            return f"{own}; the limits of its mimic joints ({names}) allow at most one value"
         allowed = format_range(self.allowed_range)
-        return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
+        return f"{own}; the limits of its mimic joints ({names}) allow only values from {allowed}"
 
 
 def format_range(ends: tuple[float, float]) -> str:
@@ -618,7 +618,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"the value is off by {np.abs(off).max():.3g}",
-            remedy="load with mimic=False to give it its own coordinate",
+            remedy="load with mimic=False to give the mimic joint its own coordinate",
             question=QuestionsSection.MIMIC_JOINTS,
         )
 

@@ -257,7 +257,8 @@ class KinematicTree:
     def __post_init__(self) -> None:
         if len(self.links) != len(self.joints) + 1:
             raise InputError(
-                "a tree has one link more than joints", found=f"{len(self.links)} and {len(self.joints)}"
+                "the number of links must be the number of joints plus 1",
+                found=f"{len(self.links)} links and {len(self.joints)} joints",
             )
         for what, names in (("link", self.links), ("joint", [joint.name for joint in self.joints])):
             if len(set(names)) != len(names):
@@ -266,7 +267,7 @@ class KinematicTree:
         for i, joint in enumerate(self.joints):
             if not 0 <= joint.parent <= i:
                 raise InputError(
-                    "a joint's parent link must come before it",
+                    "the parent link of a joint must precede the child link",
                     where=f"joint {joint.name}",
                     found=str(joint.parent),
                 )
@@ -396,7 +397,7 @@ class KinematicTree:
                 *self._unambiguous(joints[joint], links[joint + 1]),
             ]
             raise InputError(
-                f"frame {name!r} is the name of a link and of a joint at different places",
+                f"a link and a joint at different places have the name {name!r}",
                 where=self.name,
                 remedy=f"write {' or '.join(map(repr, names))}" if names else "rename the link or the joint",
             )
@@ -451,7 +452,7 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
             raise InputError(
                 f"the robot uses the name {name!r}, which a root joint needs",
                 where=tree.name,
-                remedy="rename it in the URDF, or load the robot without root_joint",
+                remedy="rename the link or joint in the URDF, or load the robot without root_joint",
             )
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
     others = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
