@@ -231,12 +231,12 @@ def test_a_validation_covers_the_whole_range_of_a_mimicked_joint() -> None:
 def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
     own = "joint leader ranges over -0.005 to 0.055 m"
-    allowed = "its mimic joints are within their limits only for values from -0.005 to 0.005 (f1)"
+    allowed = "the limits of its mimic joints (f1) allow only values from -0.005 to 0.005"
     assert f"{own}; {allowed}" in robot._text_document().text()
     kept = [joint["remaining_range"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
     (none,) = range_reductions(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
-    assert str(none).endswith("at most one value keeps all its mimic joints within their limits (f1)")
+    assert str(none).endswith("the limits of its mimic joints (f1) allow at most one value")
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, VALIDATION.schema())
     page = as_html(document)

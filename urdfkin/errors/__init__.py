@@ -25,10 +25,10 @@ _MAX_SUGGESTIONS = 3
 def find_similar_names(
     word: str, valid_names: Iterable[str], *, cutoff: float = 0.6, work: int = MAX_COMPARISONS
 ) -> list[str]:
-    """Return up to three known names that look like `word` in any case, the most similar first.
+    """Return up to three known names that are similar to `word`, the most similar first.
 
-    `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
-    `work` compared pairs of characters.
+    The comparison ignores case. `cutoff` is the least similarity, from 0 to 1, as in
+    `difflib.get_close_matches`. The search ends after `work` compared pairs of characters.
 
     >>> find_similar_names("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']

@@ -87,7 +87,7 @@ class ParsedNumber(NamedTuple):
 
 
 def parse_quantity(text: str) -> ParsedNumber | None:
-    """Parse a finite number with an optional unit; return None for other texts, also for sums.
+    """Parse a finite number with an optional unit; return None for any other text, such as a sum.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)

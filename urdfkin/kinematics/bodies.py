@@ -22,10 +22,10 @@ derivatives of x = (position, orientation). For three Euler angles in any sequen
 x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J
 is (..., 7, n).
 
-Functions that take an `ArrayLike` raise InputError for a wrong shape, a value that is not finite, an axis
-that is not of unit length, and a matrix that is not a rotation. An unknown `representation` raises
-UnknownNameError. A distance of `nearest` or less from the singularity of Euler angles raises
-RepresentationSingularityError.
+Functions that take an `ArrayLike` raise InputError for a wrong shape and for a value that is not finite.
+These functions also raise InputError for an axis that is not a unit vector and for a matrix that is not a
+rotation. An unknown `representation` raises UnknownNameError. A distance of `nearest` or less from the
+singularity of Euler angles raises RepresentationSingularityError.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ def point_acceleration(
 ) -> AccelerationParts:
     """Return the terms of p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
-    For a point that is fixed in frame 1, the sum of the terms is equation 7.123.
+    For a point that is fixed in frame 1, the sum of the terms is the acceleration of equation 7.123.
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -280,8 +280,8 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122): 6 by 6, or 7 by 6 for a quaternion.
 
-    For a quaternion, C has several right inverses. The function returns the right inverse for which the
-    quaternion's time derivative is perpendicular to the quaternion.
+    For a quaternion, C has several right inverses. The function returns one of these right inverses. With
+    this inverse, the time derivative of the quaternion is perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))

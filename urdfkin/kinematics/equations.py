@@ -1,17 +1,17 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, each written once for every kind of number.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
-because the equations use the arithmetic of their arguments. If vectors have another type,
-`urdfkin.kinematics.number_kinds` replaces the basic operations of the section "vectors". The same equations
-run on batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and
-LaTeX expressions.
+because the equations use the arithmetic of their arguments. For NumPy arrays and for lengths of vectors,
+`urdfkin.kinematics.number_kinds` replaces the functions of the section "vectors". The same equations run on
+batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and LaTeX
+expressions.
 
 All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
 own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
-and follows the joint. In a URDF, the frame of a joint lies on the joint's own axis. There, the offset belongs
-to link i-1 and precedes the joint. Both numberings give the same sums.
+and follows the joint. In a URDF, the frame of a joint lies on the joint's own axis. The offset of a URDF
+belongs to link i-1 and precedes the joint. Both numberings give the same sums.
 """
 
 # -- vectors ------------------------------------------------------------------------------------------
@@ -43,7 +43,7 @@ def cross(x, y):
 
 
 def rotate(R, x):
-    """Return R x: the vector x, given in a rotated frame, expressed in the outer frame."""
+    """Return R x, which converts the vector x from the rotated frame to the outer frame."""
     return dot(R[0], x), dot(R[1], x), dot(R[2], x)
 
 
@@ -53,7 +53,7 @@ def transposed(R):
 
 
 def product(R, S):
-    """Return R S: the orientation S, given in a frame of orientation R, expressed in the outer frame."""
+    """Return R S, which converts the orientation S from the frame with orientation R to the outer frame."""
     columns = transposed(S)
     return rotate(columns, R[0]), rotate(columns, R[1]), rotate(columns, R[2])
 

@@ -25,7 +25,8 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: Symbols for the parameters of single functions of `equations`; they replace the symbols in `_SYMBOLS`.
+#: LaTeX symbols for the parameters of some functions of `equations`, by the function's name.
+#: For these functions, the symbols replace the symbols in `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},

@@ -38,9 +38,9 @@ def least_squares(
 ) -> tuple[State, float]:
     """Return the state with the smallest residuals near `start`, and the norm of these residuals.
 
-    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). A step
-    (parameters,) is rejected if the absolute value of a component is more than `max_step`. The iteration ends
-    after `patience` consecutive slow steps; 0 means no limit.
+    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). A step is a
+    vector (parameters,). The function rejects a step if the absolute value of a component is more than
+    `max_step`. The iteration ends after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

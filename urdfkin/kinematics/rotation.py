@@ -14,8 +14,9 @@ The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
 The dots stand for any batch shape; results have the batch shape of the arguments. Functions that take an
-`ArrayLike` raise InputError for a wrong shape, a value that is not finite, a matrix that is not a rotation,
-an axis or a quaternion whose length is not 1, and an unknown `frame`.
+`ArrayLike` raise InputError for a wrong shape and for a value that is not finite. These functions also raise
+InputError for a matrix that is not a rotation and for an unknown `frame`. An axis or a quaternion whose
+length is not 1 also raises InputError.
 
 A user's matrix often has only a few digits. A conversion to a quaternion, a conversion to Euler angles, and
 Gram-Schmidt then give different rotations. `nearest_rotation` and `polar_factor` return the rotation that is
@@ -24,10 +25,10 @@ errors of any size. The nearest rotation is unique: it is the orthogonal factor 
 M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
-quaternion and its negative are the same rotation. Functions with the argument `frame` express the angular
-velocity in the fixed frame 0, as in the textbook (`frame="fixed"`), or in the body's own frame
-(`frame="body"`). Quaternion rates have no singularity. `integrate_orientation` integrates quaternion rates,
-because the integral of the angular velocity is not an orientation (example 7.3).
+quaternion and its negative are the same rotation. With `frame="fixed"`, functions express the angular
+velocity in the fixed frame 0, as in the textbook. With `frame="body"`, functions express the angular velocity
+in the body's own frame. Quaternion rates have no singularity. `integrate_orientation` integrates quaternion
+rates, because the integral of the angular velocity is not an orientation (example 7.3).
 
 Euler angles have 24 sequences. A name has three letters, in the order of the angles. Capital letters are axes
 that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the
@@ -99,9 +100,10 @@ ROUNDED = 1e-15
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the rotation that is nearest to a matrix M, up to rounding.
 
-    The entries of M are those of a rotation, rounded to nine decimals. The method is one Newton step (Bjorck
-    and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is 3e-9 at
-    most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding error.
+    M is a rotation matrix whose entries may be rounded to nine decimals. The method is one Newton step
+    (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is
+    3e-9 at most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding
+    error.
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -119,7 +121,7 @@ def polar_factor(M: FloatArray) -> FloatArray:
 
 
 def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
-    """Return a rotation with `axis` as its third column; for the axis z, it is the identity.
+    """Return a rotation matrix whose third column is `axis`; for the axis z, return the identity.
 
     The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. If the
     z component of `axis` is not negative, the result is the shortest rotation from z to `axis`. Otherwise,
@@ -260,9 +262,9 @@ def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed"
 def angular_velocity_from_quaternion_rates(
     quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
+    """Return the angular velocity w = 4 E^T (q-dot, q0-dot), which solves equation 7.57 for w.
 
-    Rates along the quaternion change only the quaternion's length, and E^T maps them to 0.
+    Rates that are parallel to the quaternion change only the quaternion's length. E^T maps such rates to 0.
     """
     E = quaternion_rate_matrix(quat, frame)
     return 4.0 * (E.swapaxes(-1, -2) @ as_vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
@@ -273,9 +275,9 @@ def integrate_orientation(
 ) -> FloatArray:
     """Integrate 7.57 by the fourth-order Runge-Kutta method; return quaternions (n, ..., 4).
 
-    `w` returns the angular velocity (..., 3) at a time in s, and `quat` is the orientation at the first of
-    the n increasing `times`. The angular velocity must be smooth within a step, so `times` must contain each
-    jump. At both ends of a step, `w` is evaluated slightly inside the step.
+    `w` returns the angular velocity (..., 3) at a time in s. `quat` is the orientation at the first of the n
+    increasing `times`. If the angular velocity jumps, `times` must contain the time of the jump, because `w`
+    must be smooth within a step. At both ends of a step, `w` is evaluated slightly inside the step.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -518,16 +520,18 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the matrix Omega^-1 (..., 3, 3) in closed form, from the geometry of the axes (7.56).
 
-    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
-    axis has no component along the second axis. One component of w then gives the third rate, and the other
-    two components give the first and the second rate.
+    The method expresses w in the frame after the first rotation. In this frame, the first and the second axis
+    are coordinate axes. The third axis has no component along the second axis. One component of w gives the
+    third rate, and another component gives the second rate. The remaining component and the third rate give
+    the first rate.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
     axes = find_sequence(name)
     turns = axes.reorder(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # `along` and `across` are the third axis' components along the axes `first` and `other`.
+    # `along` is the component of the third rotation axis along the axis `first`.
+    # `across` is the component of the third rotation axis along the axis `other`.
     if axes.is_proper:
         along, across = cosine, -axes.sign * sine
     else:

@@ -3,12 +3,12 @@
 The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
 eps. Errors are counted to first order. A tolerance is `count * eps * scale`. The scale of a result is an
 upper bound on the sum of the absolute values of the terms of the result (`urdfkin.kinematics.number_kinds`).
-This module defines the counts. `urdfkin.verify.bounds` computes the scales for the forward recursion, and the
+This module defines the counts. `urdfkin.verify.bounds` computes the scales for the forward recursion. The
 modules of `urdfkin.dh` compute the scales for Denavit-Hartenberg tables.
 
-**A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
-by its rotation about its axis. If *all* rounding errors have the same sign, the error of a component of a
-rotated vector grows for each joint by
+**A joint.** For each joint, the recursion multiplies the rotation of the previous link by two rotations. The
+first rotation is the joint's constant rotation. The second rotation is the joint's motion about its axis. If
+*all* rounding errors have the same sign, the error of a component of a rotated vector grows for each joint by
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -24,42 +24,43 @@ and of Pinocchio may have opposite signs, so the bound for the difference is 5.7
 `tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers that
 record each of their roundings.
 
-The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
-factors of this term. The addition of the terms and the cross products in a term have rounding errors too. In
+For example, the acceleration of a frame is a sum of terms such as w x (w x d). This term has the three
+factors w, w and d. The addition of the terms and the cross products in a term have rounding errors too. In
 each implementation, the sum of these errors is at most 2 eps for each term. A term has two or three factors
-(`urdfkin.verify.bounds`). Two margins cover these errors. First, the tolerance is computed for one more joint
-than the path has. The margin of this joint covers the errors of the frame's own offset and of the first sum.
-Second, `PINOCCHIO_ROUNDINGS` is 24 instead of 22.5. The difference of 1.5 covers the errors of the other
-sums.
+(`urdfkin.verify.bounds`). Two margins cover these errors. First, the tolerance is computed for a path with
+one additional joint. The margin of the additional joint covers the error of the frame's own offset and the
+error of the first sum. Second, `PINOCCHIO_ROUNDINGS` is 24, which is 1.5 more than 22.5. The margin of 1.5
+covers the errors of all other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
 multiplied by the inverse rotation of each joint before link k. A term of link k, such as w x (w x d), is
 multiplied by the rotation of each joint between link k and the frame. Finally this term is multiplied once by
 R, the product of all rotations. For w x (w x d), the number of rotations is at most three times the number of
-joints of the path. In the world's axes, the number of rotations is the same.
+joints of the path. This limit holds in the world's axes and in a link's axes.
 
-If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. Let
-A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant rotation by A, and
-by the inverse of the previous joint's A. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
-result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
-41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over
-its range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times
-this standard deviation.
+If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. For
+each joint, let A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant
+rotation by A. urdfkin also multiplies the constant rotation by the inverse of the rotation A of the previous
+joint. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the result depends on the length of the
+axis. If all 340 rounding errors have the same sign, the total error is 41. `PINOCCHIO_ROUNDINGS` does not
+cover this worst case. If each rounding error is uniformly distributed over its range, the standard deviation
+of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
 2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t adds
-2 t / eps rounding errors to each factor of a term. This addition applies to all frames after the joint. If a
-tilt is larger than eps, urdfkin reports the finding URDF514.
+at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t increases
+the error of each factor of a term by 2 t / eps, in units of eps. This increase applies to all frames after
+the joint. If a tilt is larger than eps, urdfkin reports the finding URDF514.
 
-**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
-small constants. An entry of a constant rotation matrix is small if it is less than half an eps of the largest
-entry in its row. A component of an offset is small if it is less than half an eps of the largest component.
-Each omission causes an error of half an eps, but the rounding errors of one product and one sum disappear.
-The compiler decides whether products and sums are fused. An export uses the sine and cosine of a library.
-Only batches in C use polynomials with an error of one eps; three subtractions reduce the polynomials' angle.
+**An export.** Exported code (`urdfkin.export`) computes the same equations, but omits multiplications by 0
+and by 1. An export also omits small constants. An entry of a constant rotation matrix is small if it is less
+than half an eps of the largest entry in its row. A component of an offset is small if it is less than half an
+eps of the largest component. Each omission causes an error of half an eps, but the rounding errors of one
+product and one sum disappear. The compiler decides whether products and sums are fused. An export uses the
+sine and cosine of a library. Only batches in C use polynomials with an error of one eps; three subtractions
+reduce the polynomials' angle.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -79,17 +80,18 @@ The counts of an export's joint are
 | all of an export's joint | 6.5 | 7.2 |
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
-offset's length. In a matrix row and in a cross product, an export also omits each product that contains an
-omitted component. The error of this omission is smaller than 1.5, the rounding error of these products.
-Without fused multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint,
-plus the errors of the sums over the joints. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these sums. The
-standard deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the
-error is at most 7.2 eps, which is within `PINOCCHIO_ROUNDINGS`.
+offset's length. In matrix rows and cross products, an export omits each product that contains an omitted
+component. The error of this omission is smaller than 1.5, the rounding error of these products. Without fused
+multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint. The errors of
+the sums over the joints are added to this difference. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these
+sums. The standard deviation of the error is the same for an export and for urdfkin. Test vectors contain true
+values. If an export is compared with test vectors, the error is at most 7.2 eps, which is within
+`PINOCCHIO_ROUNDINGS`.
 
-**An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
-2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.function`
-multiplies each error by the derivative of the result with respect to the operation or constant. The bound is
-the sum of the absolute values of all these products. The error of one operation is
+**An export in single precision.** An export in single precision has a separate bound for each number of a
+test vector. The unit is eps = 2^-23. The value of each operation and of each constant has a rounding error.
+`urdfkin.export.function` multiplies each error by the derivative of the result with respect to the operation
+or constant. The bound is the sum of the absolute values of all these products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -100,36 +102,38 @@ the sum of the absolute values of all these products. The error of one operation
 | sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
 
 A change of sign has no error. The inputs of a test vector are stored as single-precision numbers, so they
-have no rounding error. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most,
-because GPUs and some compilers replace such a number by 0. The constants also have the rounding errors of the
-export in double precision. Therefore, the double-precision bound, multiplied by 2^-52 / 2^-23, is added to
-the single-precision bound. An export has no other operations, so there are no other errors.
+have no rounding error. GPUs and some compilers replace a number below the smallest normal number, 2^-126, by
+0. Therefore, the error of such a number is at most 2^-126. The constants also have the rounding errors of the
+export in double precision. The factor 2^-52 / 2^-23 converts the bound on these errors to the unit of single
+precision. The converted bound is added to the bound of single precision. An export contains only the
+operations of the table, so this section counts all errors.
 
-**MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
-multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
-rotation. MuJoCo normalises the joint's axis first. At each link, MuJoCo normalises the quaternion and
-converts it to a matrix. If all rounding errors have the same sign, the error is
+**MuJoCo.** MuJoCo is the optional second oracle. MuJoCo computes the orientation as a unit quaternion. For
+each joint, MuJoCo multiplies this quaternion by the quaternion of the constant rotation and by the quaternion
+of the joint's rotation. MuJoCo normalises the joint's axis first. At each link, MuJoCo normalises the
+quaternion and converts it to a matrix. If all rounding errors have the same sign, the error is
 
 | | MuJoCo |
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO_ROUNDINGS` is 30 instead of 27.2. The difference of 2.8
-covers the sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
+Together with urdfkin's error of 5.7, the bound for the difference is 27.2. `MUJOCO_ROUNDINGS` is 30, which is
+2.8 more than 27.2. The margin of 2.8 covers the errors of the sums over the joints. MuJoCo does not replace
+the file's axes by coordinate axes.
 
-**A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
-doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
-to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
-same order. Both programs start with the rule that refers to the independent joint. The errors of sine and
-cosine are counted above. The functions sine and cosine first subtract multiples of pi/2 from the angle; this
-subtraction is exact for every angle, also for 1e12 rad. Therefore a mistake in a mimic joint's angle is
-always detected.
+**A mimic joint.** A mimic joint adds no rounding error. urdfkin and the oracle compute a mimic joint's angle
+m q + c from the same doubles m and c. Both programs round the multiplication and then the addition, so IEEE
+754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle
+combine the rules in the same order. Both programs start with the rule that refers to the independent joint.
+The errors of sine and cosine are counted above. The functions sine and cosine first subtract multiples of
+pi/2 from the angle; this subtraction is exact for every angle, also for 1e12 rad. Therefore a mistake in a
+mimic joint's angle is always detected.
 
-**A base** (`urdfkin.BaseMotion`) gives the robot's root link a pose in the world. A base with a rotation M
+**A base.** `urdfkin.BaseMotion` gives the robot's root link a pose in the world. A base with a rotation M
 counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
-user's matrix M have at least nine correct decimals. Each of the two programs replaces M by the nearest
-rotation, with a method of its own. Therefore, the error does not depend on the distance of M from the nearest
-rotation. The counts, with u = eps/2, are
+user's matrix M have at least nine correct decimals. urdfkin and Pinocchio replace M by the nearest rotation,
+with different methods. Therefore, the error does not depend on the distance of M from the nearest rotation.
+The counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -141,11 +145,11 @@ rotation. The counts, with u = eps/2, are
 | a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
 | sum | 3.2 | 17.0 |
 
-The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin)
-and 5.1 (Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
+The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 for urdfkin
+and 5.1 for Pinocchio. The measurement used 1,500 matrices and reference values with 50 digits.
 
-**An MJCF equality** is y - y0 = c0 + c1 (x - x0), with reference values y0 and x0. The tree's mimic rules
-satisfy it up to
+**An MJCF equality.** An equality in an MJCF file is y - y0 = c0 + c1 (x - x0). Here x and y are the values of
+two joints, with the reference values x0 and y0. The tree's mimic rules satisfy the equality up to
 
 | | |
 |---|---|
@@ -211,7 +215,7 @@ ROW_ROUNDINGS = 8.0
 # Errors in exports in single precision (`urdfkin.export.function`); the docstring derives the errors.
 
 SINGLE_EPS = 2.0**-23
-#: The smallest normal number, and the largest number, of single precision.
+#: In single precision: the smallest normal number and the largest number.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
 #: Relative error (in eps) of each operation.
 SINGLE_OPERATION = dict.fromkeys("+-*", 0.5) | {"/": 1.0, "sqrt": 1.0, "neg": 0.0, "sin": 3.5, "cos": 3.5}
@@ -221,8 +225,8 @@ SINGLE_POLYNOMIAL = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
-#: The worst case is 18.9 eps.
-#: It is the sum of the docstring's first table without the row "rotation about the axis".
+#: The worst case is 18.9 eps, which is the sum of four numbers in the docstring's first table.
+#: These numbers are in the rows for the product and for the constant rotation.
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Error (in eps) of the directions of two joint axes.
@@ -232,7 +236,8 @@ AXIS_ROUNDINGS = 5.0
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
 #: Roll and pitch both change the angle between a joint's z axis and the z axis of the joint before it.
-#: Yaw does not change this angle. Therefore, the error of 22.5 eps counts twice.
+#: Yaw does not change this angle.
+#: Therefore, the error of 22.5 eps counts twice.
 FILE_ROUNDINGS = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path.
 #: A dot product has an error of 2.4 eps; each sum of lengths has an error of 0.5 eps times the sum.
@@ -247,14 +252,17 @@ LENGTH_ROUNDINGS = 4.0
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
-#: One factor of each product is also a difference of two products, which adds an error of 0.75.
+#: In each of these products, one factor is a difference of two products.
+#: This factor adds an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
 #: Allowed change when a length is rounded to twelve digits, in units of eps times the length of the path.
 DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
-#: The product's error is the sum of 0.5 (sines), 0.5 (cosines), 1.4 and 1.8 (the two multiplications).
+#: The product's error is the sum of four errors.
+#: The sines and the cosines have an error of 0.5 each.
+#: The two matrix multiplications have the errors 1.4 and 1.8.
 ROTATION_ROUNDINGS = 8.0
 
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.

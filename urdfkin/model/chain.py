@@ -1,10 +1,11 @@
 """A path between two frames as a sequence of joint axes, the basis of Denavit-Hartenberg tables.
 
-As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
-d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
-a common ancestor (left foot to right hand). Fixed joints are merged into the constant poses. If the path
-passes a joint backwards, from child to parent, the joint's axis is reversed. The joint's coordinate keeps the
-sign of the URDF, because the inverse of a rotation by q about z is a rotation by q about -z.
+As in section 7.5 of the textbook, the axis of joint i is z_{i-1} at O_{i-1}. A revolute joint rotates about
+this axis, and a prismatic joint translates along this axis. The vector d_{i-1,i} leads from O_{i-1} to O_i.
+The path may lead from parent to child, from child to parent, or through a common ancestor. An example is the
+path from the left foot to the right hand. Fixed joints are merged into the constant poses. If the path passes
+a joint backwards, from child to parent, the joint's axis is reversed. The joint's coordinate keeps the sign
+of the URDF. The reason is that the inverse of a rotation by q about z is a rotation by q about -z.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class FrameChain(Displayable):
 
     Attributes:
         robot: The robot's name.
-        base: Name of the first frame; results are expressed in it.
+        base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
@@ -169,7 +170,7 @@ class FrameChain(Displayable):
 
     @cached_property
     def reach(self) -> float:
-        """Sum (m) of the lengths of the constant offsets between joints, and from the last joint to the tip.
+        """Sum (m) of the lengths of the constant offsets from the first joint to the tip.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

@@ -46,13 +46,14 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Samples are at most this far from zero (rad or m). This number also replaces a missing limit.
-#: The range of a continuous joint is -pi to pi.
-#: All bounds assume this largest distance (m) from zero for a joint without limits that translates.
+#: Largest absolute value (rad or m) of a sampled joint value.
+#: This number replaces a missing limit, but the range of a continuous joint is -pi to pi.
+#: Bounds that require limited travel assume this distance (m) from zero for joints without limits.
+#: Such joints are prismatic, planar and floating joints.
 #: Few linear axes of robots are longer than 10 m.
 #: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: The condition of a bound, as text, if a joint that translates has no limits.
+#: Text of the condition under which such a bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
@@ -76,9 +77,9 @@ class RangeReduction:
         names = ", ".join(self.mimic_joints)
         own = f"joint {self.joint} ranges over {format_range(self.joint_range)} {self.unit}"
         if self.allowed_range is None:
-            return f"{own}; at most one value keeps all its mimic joints within their limits ({names})"
+            return f"{own}; the limits of its mimic joints ({names}) allow at most one value"
         allowed = format_range(self.allowed_range)
-        return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
+        return f"{own}; the limits of its mimic joints ({names}) allow only values from {allowed}"
 
 
 def format_range(ends: tuple[float, float]) -> str:
@@ -123,7 +124,10 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Narrow `joint_ranges` so that all mimic joints are within their limits, where this is possible."""
+    """Return `joint_ranges`, narrowed so that all mimic joints are within their limits.
+
+    A range is not narrowed if the mimic joints allow at most one value.
+    """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
@@ -153,9 +157,9 @@ def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
 
 
 def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
+    """Return the part of a mimicked joint's range that the limits of a mimic joint allow.
 
-    If the mimic joint is outside its limits in the whole range, the lower end is above the upper end.
+    If the limits allow no value of the range, the returned lower end is above the returned upper end.
     """
     least, most = _widen_limits(limit)
 
@@ -311,8 +315,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    The tree's pose `ready` may contain values for some joints only. Each other joint is then at 0, or in the
-    middle of its range if the range excludes 0.
+    The tree's pose `ready` may contain values for some joints only. The remaining joints are at 0 in `ready`.
+    If a joint's range excludes 0, the joint is in the middle of the range instead.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -332,10 +336,11 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
 
-    Without `joints`, only the joints in `lock` are locked. `joints` lists the joints that stay movable. Every
-    other joint is then locked at its value in `lock`, or at 0 if `lock` has no value. If `joints` is given,
-    `lock` may begin with the name of a pose. The values of the pose then replace 0. An unknown name raises
-    UnknownNameError. Any other invalid lock, for example a value outside the limits, raises InputError.
+    Without `joints`, only the joints in `lock` are locked. If `joints` is given, the joints in `joints` stay
+    movable, and all remaining joints are locked. A locked joint without a value in `lock` is locked at 0. If
+    `joints` is given, `lock` may begin with the name of a pose. In this case, a joint without a value in
+    `lock` is locked at the pose's value. An unknown name raises UnknownNameError. Any other invalid lock, for
+    example a value outside the limits, raises InputError.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -374,9 +379,9 @@ def parse_locks(
 
 
 def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
-    """Raise InputError if a locked joint, or a joint that mimics it, is outside its limits.
+    """Raise InputError if the value of a locked joint or of its mimic joint is outside the limits.
 
-    A mimic joint that is outside its limits at every value of the locked joint is not checked.
+    The limits of mimic joints are not checked if these limits allow at most one value of the locked joint.
     """
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
@@ -468,7 +473,10 @@ def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint, also a mimic joint, that exceeds its limits anywhere in `q`."""
+    """Return a message for each joint that exceeds its limits in a configuration of `q`.
+
+    The function also checks mimic joints.
+    """
     return [words for _, words in _violations(tree, q)]
 
 
@@ -610,7 +618,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
             where=f"joint {joint.name}",
             found=f"the value is off by {np.abs(off).max():.3g}",
-            remedy="load with mimic=False to give it its own coordinate",
+            remedy="load with mimic=False to give the mimic joint its own coordinate",
             question=QuestionsSection.MIMIC_JOINTS,
         )
 
@@ -634,7 +642,8 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     """Return random configurations (n, nq), uniform within the ranges of `coordinate_ranges`.
 
     Continuous joints take any angle. Planar and floating joints take any orientation, and positions within
-    +-2 m. For other joints, a missing limit, or a limit beyond +-10 (rad or m), is replaced by +-10.
+    +-2 m. A revolute or prismatic joint without limits takes values within +-10 (rad or m). A limit beyond
+    +-10 is replaced by +-10.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -688,11 +697,11 @@ def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
 
 
 def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Return samples for a validation: `n` random ones and, if requested, `special_configurations`.
+    """Return `n` random samples for a validation; `with_special` adds `special_configurations`.
 
-    The samples cover each joint's own range, even if a mimic joint then exceeds its limits, because the
-    equations are valid beyond the limits too. Every eighth sample has a hundred times larger velocities and
-    accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
+    The samples cover the whole range of each independent joint. A mimic joint may exceed its limits, because
+    the equations are also valid outside the limits. Every eighth sample has a hundred times larger velocities
+    and accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_special:

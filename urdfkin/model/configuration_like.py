@@ -48,8 +48,10 @@ class CoordinateLayout:
 
     Attributes:
         symbol: "q", "v" or "a".
-        units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
-        spans: For each joint with several numbers: the index of its first number, and their count.
+        units: "rad", "m", "" or None. A number without a unit, such as a component of a quaternion, has "".
+            None means that the unit is unknown.
+        spans: Pair (index of the joint's first number, count of the joint's numbers), for each joint with
+            several numbers.
         hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
         hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of
             Pinocchio's q.
@@ -86,9 +88,10 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return a dict from each name in a text or mapping to its value, and a pose (n,) or None.
+        """Return the values of a text or mapping by name, and the named pose (n,) or None.
 
-        A text such as `ready, elbow=pi/2` begins with the name of the pose.
+        A text such as `ready, elbow=pi/2` begins with the name of the pose. Without such a name, the second
+        result is None.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)

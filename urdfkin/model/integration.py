@@ -50,8 +50,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    For a revolute joint without limits, the result is the shorter of the two possible rotations. The same
-    holds for the angle of a planar joint.
+    For a continuous joint, the result is the shorter of the two possible rotations. The angle of a planar
+    joint also changes by the shorter rotation.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))

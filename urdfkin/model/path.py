@@ -30,7 +30,7 @@ _IDENTITY = np.eye(4)
 
 @dataclass(frozen=True, slots=True)
 class ElementaryMotion:
-    """A rotation about, or a translation along, a coordinate axis of the current frame.
+    """A rotation about a coordinate axis of the current frame, or a translation along this axis.
 
     The value of `axis` is 0 for the x axis, 1 for y and 2 for z.
     """
@@ -104,7 +104,10 @@ class Path:
 
 
 def elementary_pose(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
-    """Return the poses (..., 4, 4) of rotations (rad) about, or translations (m) along, a coordinate axis."""
+    """Return the poses (..., 4, 4) of elementary motions.
+
+    `amount` is the angle (rad) of a rotation about the axis, or the distance (m) of a translation along it.
+    """
     amount = np.asarray(amount, np.float64)
     T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
     return _apply_motion(T, ElementaryMotion(axis, turns), amount) if amount.any() else T

@@ -209,9 +209,10 @@ class Recursion:
                 yield of.v_index, by.v_index, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of the Jacobian column `six` with respect to the coordinate of column `by`.
+        """Return the derivative of the Jacobian column `six` with respect to a joint coordinate.
 
-        `before` is True if the joint of `by` is the joint of `six`, or comes earlier on the path.
+        `by` is the Jacobian column of the joint that has this coordinate. `before` is True if `by` belongs to
+        the same joint as `six`, or to an earlier joint of the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -24,7 +24,8 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: Whether the results describe the body point that is now at the world's origin, not the frame's origin.
+    #: True: the results describe the body point that is now at the world's origin.
+    #: False: the results describe the frame's origin.
     at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:

@@ -2,8 +2,8 @@
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
 first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
-has the name of its link or joint; the prefix `link:` or `joint:` is needed if a link and a joint have equal
-names.
+has the name of its link or joint. If a link and a joint at different places have the same name, the prefix
+`link:` or `joint:` is needed.
 """
 
 from __future__ import annotations
@@ -106,7 +106,8 @@ class Limit:
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
-#: The excess must also be more than `_FAR_FRACTION` times the joint's range.
+#: The value must also exceed this limit by more than `_FAR_FRACTION` times the joint's range.
+#: If a limit is missing, each value that exceeds the other limit is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
@@ -256,7 +257,8 @@ class KinematicTree:
     def __post_init__(self) -> None:
         if len(self.links) != len(self.joints) + 1:
             raise InputError(
-                "a tree has one link more than joints", found=f"{len(self.links)} and {len(self.joints)}"
+                "the number of links must be the number of joints plus 1",
+                found=f"{len(self.links)} links and {len(self.joints)} joints",
             )
         for what, names in (("link", self.links), ("joint", [joint.name for joint in self.joints])):
             if len(set(names)) != len(names):
@@ -265,7 +267,7 @@ class KinematicTree:
         for i, joint in enumerate(self.joints):
             if not 0 <= joint.parent <= i:
                 raise InputError(
-                    "a joint's parent link must come before it",
+                    "the parent link of a joint must precede the child link",
                     where=f"joint {joint.name}",
                     found=str(joint.parent),
                 )
@@ -371,9 +373,9 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
-        A link or joint with exactly this name has priority. Otherwise `link:NAME` selects the link and
-        `joint:NAME` the joint. An unknown name raises UnknownNameError; a name of a link and of a joint at
-        different places raises InputError.
+        A link or joint with exactly this name has priority. If no link or joint has this name, `link:NAME`
+        selects the link NAME, and `joint:NAME` selects the joint NAME. An unknown name raises
+        UnknownNameError. A name that a link and a joint at different places share raises InputError.
         """
         if not isinstance(name, str):
             raise InputError(
@@ -395,7 +397,7 @@ class KinematicTree:
                 *self._unambiguous(joints[joint], links[joint + 1]),
             ]
             raise InputError(
-                f"frame {name!r} is the name of a link and of a joint at different places",
+                f"a link and a joint at different places have the name {name!r}",
                 where=self.name,
                 remedy=f"write {' or '.join(map(repr, names))}" if names else "rename the link or the joint",
             )
@@ -450,7 +452,7 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
             raise InputError(
                 f"the robot uses the name {name!r}, which a root joint needs",
                 where=tree.name,
-                remedy="rename it in the URDF, or load the robot without root_joint",
+                remedy="rename the link or joint in the URDF, or load the robot without root_joint",
             )
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
     others = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]

@@ -19,8 +19,9 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
-#: Numbers of the equations that are unknown, because page 2 of the textbook's chapter is lost.
-#: Section 7.2 repeats the equation 7.7 of this page.
+#: Numbers of the equations whose statements are unknown.
+#: Page 2 of the textbook's chapter, which contains these equations, is lost.
+#: Equation 7.7 of this page is known, because section 7.2 repeats the equation.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (

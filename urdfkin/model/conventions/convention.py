@@ -64,8 +64,8 @@ class JointRule:
     The property `factor` includes the sign.
 
     Attributes:
-        unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
-            unit; `factor` is then None.
+        unit: "rad", "deg", "turn", "m" or "mm". Another unit of an angle is given as a number: the count of
+            units in one turn. None means the convention's unit; in this case, `factor` is None.
     """
 
     name: str | None = None
@@ -265,7 +265,8 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: The last base-62 digit of an encoded number is less than 31. All digits before the last are at least 31.
+#: The last base-62 digit of an encoded number has a value from 0 to 30.
+#: Each digit before the last digit has a value from 31 to 61.
 _THRESHOLD = 31
 
 
@@ -308,8 +309,9 @@ def make_identifier(name: str) -> str:
 def transcode(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    The result consists of "tn__", the name's allowed characters, and "_" if the name has allowed characters.
-    One number in base 62 for each other character follows. The numbers are in the order of the code points.
+    The result begins with "tn__" and the name's letters, digits and underscores (ASCII). The character "_"
+    follows if the name contains such characters. The result ends with a number in base 62 for each remaining
+    character. The numbers are in the order of the code points. An identifier is returned unchanged.
 
     As in Punycode, the number is d n + p. The difference d is the character's code point minus the code point
     of the previous character. p is the character's position among the characters that are already encoded. n

@@ -1,4 +1,4 @@
-"""Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
+"""Convert q, v, a, Jacobians and six-vectors of a robot between urdfkin and another program.
 
 Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
 and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
@@ -51,8 +51,9 @@ class _TargetNumber:
 class _FreeJoint:
     """A planar or floating joint; the target program uses other axes or another point for its velocity.
 
-    `q` and `v` are the indices of the joint's first numbers in urdfkin's vectors, and `rows` are the joint's
-    indices in the target program's v. The linear velocity is that of `point` (3,), in the joint's frame.
+    `q` is the index of the joint's first coordinate in urdfkin's q. `v` is the index of the joint's first
+    velocity in urdfkin's v. `rows` are the joint's indices in the target program's v. The target program uses
+    the linear velocity of the point `point` (3,), whose coordinates are in the joint's frame.
     """
 
     joint: Joint
@@ -146,9 +147,9 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _determines_coordinate(self, i: int) -> bool:
-        """Return False only for a mimic joint with multiplier 0.
+        """Return whether the value of joint i determines a coordinate.
 
-        The value of such a joint does not determine the mimicked joint's coordinate.
+        A mimic joint with the multiplier 0 does not determine the mimicked joint's coordinate.
         """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
@@ -412,8 +413,9 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's; inverse of `to`.
 
-        A wrong length, a number that is not finite, or a mimic joint's value that differs from its mimic rule
-        raises InputError. A (cos, sin) pair whose norm is not 1 within 1e-6 also raises InputError.
+        A wrong length or a number that is not finite raises InputError. A mimic joint's value that does not
+        follow the mimic rule raises InputError. A (cos, sin) pair whose norm is not 1 within 1e-6 raises
+        InputError.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -563,8 +565,8 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
-        Several numbers of v_tool may depend on the same number of v. M^-1 then computes the number of v from
-        one of these numbers. The columns of the others are 0.
+        Several numbers of v_tool may depend on the same number of v. In this case, M^-1 computes the number
+        of v from one of these numbers. For each unused number of v_tool, the column of M^-1 is 0.
         """
         if not self._blocks:
             M_inverse = np.zeros((self.tree.nv, self.nv))
@@ -781,8 +783,8 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     """For each entry of urdfkin's q or v, return the index of the number that determines the entry.
 
-    The index counts the numbers of the target program's q or v. A mimic joint's number is chosen only if no
-    other number determines the entry.
+    The index refers to the target program's q or v. A number of an independent joint has priority over a
+    number of a mimic joint.
     """
     return [
         min(
@@ -810,5 +812,8 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Return M (..., 1, k, l) if a Jacobian with `ndim` array axes contains several frames, else M."""
+    """Return M in a shape that broadcasts with a Jacobian with `ndim` array axes.
+
+    If M is a batch and the Jacobian contains several frames, the shape is (..., 1, k, l).
+    """
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

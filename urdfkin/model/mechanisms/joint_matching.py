@@ -1,7 +1,7 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-Joints at two matched bodies are paired by the names that the user gives or by equal names. Otherwise, joints
-are paired by equal labels of the links after the joints, or by geometry.
+Joints at two matched bodies are paired by the names that the user gives or by equal names. The remaining
+joints are paired by equal labels of the links after the joints, or by geometry.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
@@ -295,10 +295,10 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield the pairs of joint axes at two bodies.
+    """Yield each pair of a joint axis at A's body and a joint axis of the same kind at B's body.
 
-    If A's axis in a pair is parallel to A's `reference` line, the function then also yields the pairs at the
-    bodies after these two joints.
+    After a pair, the function continues with the two next bodies if A's axis is parallel to A's `reference`
+    line.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -312,13 +312,14 @@ def later_axes(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    If possible, the poses also align the axes of other joints.
+    The axes of other joints determine the rotation about the aligned axis and the shift along this axis. A
+    rotation or shift that no axis determines is 0.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
         # If no joint follows an axis, the axes of other branches determine the pose of B's root.
-        # For example, this is so for a drone's rotors.
+        # For example, no joint follows the axes of a drone's rotors.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -331,9 +332,10 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align up to three joint axes of a body of B with axes of a body of A.
+    """Yield poses of B's root that align joint axes of one body of B with joint axes of one body of A.
 
-    If these axes do not determine the shift along the first axis, the axes of later joints determine it.
+    A pose aligns up to three axes. If these axes do not determine the shift along the first axis, the axes of
+    later joints determine the shift.
     """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
@@ -389,7 +391,7 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first pair of revolute axes of each pair of branches of A and B.
+    """Return the first pair of revolute axes for each branch of A and each branch of B.
 
     Each item contains the first revolute pair, the prismatic pairs before this pair, and the pairs after this
     pair. If two branches have only prismatic pairs, the last prismatic pair takes the place of the first
@@ -429,7 +431,8 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 
 
 #: Function that proposes poses of B's body after two matched joints.
-#: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joints.
+#: The first argument contains the two bodies after the joints, and the second argument contains the joints.
+#: The third argument is the pose of B's body before the joints.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: Maximum number of joint pairs that the search for an exact match tries at two bodies.
@@ -474,7 +477,7 @@ class SubtreeMatcher:
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after joint f for an exact match, else None."""
+        """Return the pose (4, 4) of B's body after joint f if the subtrees match exactly, else None."""
         found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 

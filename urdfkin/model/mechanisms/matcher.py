@@ -1,13 +1,14 @@
 """Align mechanism B with mechanism A: match their joints, and find the sign and zero offset of each joint.
 
 `MechanismMatcher` starts at a body of A and a body of B, and visits both trees joint by joint. At each joint,
-the matcher chooses the sign (`sense`) and the zero offset for which most later links and axes of B coincide
-with those of A. `align` compares the results for several first bodies and joint orders.
+the matcher chooses the sign (`sense`) and the zero offset. The best choice makes the largest number of later
+links and axes of B coincide with links and axes of A. `align` compares the results for several first bodies
+and joint orders.
 
 If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. Let v =
-m w + c be a mimic rule of A, and let v' = m' w' + c' be the corresponding rule of B. The two rules are
-equivalent if inserting v' = s v + o and w' = s' w + o' into the second rule gives the first rule. For a
-revolute joint, a multiple of a full turn may always be added to o.
+m w + c be a mimic rule of A, and v' = m' w' + c' the corresponding rule of B. Insert v' = s v + o and w' = s'
+w + o' into the second rule. The two rules are equivalent if the result is the first rule. For a revolute
+joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -53,13 +54,15 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
-#: Number of further joints that the matcher compares if several choices are equally good.
+#: If several choices are equally good, the matcher compares later joints of each branch.
+#: Maximum number of these joints on a branch.
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: Of two scores, the score with more agreeing links and axes is better.
 #: If both numbers are equal, the largest differences (m) of the two scores are compared.
-#: The better score's difference is less than this factor times the other score's difference.
+#: The score with the smaller difference is better if the smaller difference is small enough.
+#: The smaller difference must be less than this factor times the larger difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -98,8 +101,8 @@ class MechanismMatcher:
     """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
 
     Without `choices`, the matcher finds the choices for which most joints and links agree. Without `base`,
-    the matcher starts at A's root body and the body of B that shares most link names with A's root body. If
-    no body of B shares a link name, the matcher tries all bodies of B.
+    the matcher starts at A's root body. In B, the matcher starts at the body that shares most link names with
+    A's root body. If no body of B shares a link name with A's root body, the matcher tries all bodies of B.
     """
 
     def __init__(
@@ -174,9 +177,9 @@ class MechanismMatcher:
     def _most_matches(self, base: tuple[int, int]) -> int:
         """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
-        Two matched branches have at most as many joint pairs as the smaller branch has joints. The same holds
-        for links. The sum over all branches is largest if the branches are matched in the order of their
-        sizes.
+        The number of joint pairs in two matched branches is at most the smaller number of joints. The number
+        of link pairs is at most the smaller number of links. The sum over all branches is largest if the
+        branches are matched in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -309,10 +312,10 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Return two links of matched bodies as a pair of different end-effector frames.
+        """Pair a link of A and a link of B that are different end-effector frames of two matched bodies.
 
-        The result is None if a link of one body already matches a link of the other body. The result is also
-        None if every link name of one body occurs in the other model.
+        The result is None in two cases. In the first case, a link of one body already matches a link of the
+        other body. In the second case, every link name of one body occurs in the other model.
         """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
@@ -441,7 +444,8 @@ class MechanismMatcher:
 
         `pose_a` (4, 4) is the frame of A's joint after the motion G. `zero_pose_b` (4, 4) is the frame of B's
         joint in B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane`
-        (4, 4) is one possible motion N, and every possible N is the product of `plane` and a planar pose.
+        (4, 4) is one of the possible motions N. Each possible motion N is the product of `plane` and a planar
+        pose.
         """
         yield IDENTITY if plane is None else plane
         candidates = [next_pair.XC]
@@ -482,7 +486,9 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*pose_difference(body_pair.XC, exact)) else zero
             offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             return replace(step, offset=offset), next_pair, score
-        # In B, either the axis and all later bodies are moved by K, or only the axis is moved.
+        # The motion K moves A's axis to B's axis.
+        # In the first case, K displaces B's axis together with all later bodies of B.
+        # In the second case, K displaces only B's axis.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
         with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -520,8 +526,8 @@ class MechanismMatcher:
     ) -> tuple[_Choice, BodyPair, Score]:
         """Return the choice for which most links and axes agree.
 
-        If several choices are equally good, the method also compares the next joints. For example, two axes
-        that intersect at right angles allow two poses of B, so a third axis must decide.
+        If several choices are equally good, the method compares later joints. For example, two axes that
+        intersect at right angles allow two poses of B, so a third axis must decide.
         """
         scored = list[tuple[_Choice, BodyPair, Score]]()
         for choice, body_pair in choices:
@@ -703,7 +709,10 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
+    """Exchange the partners of two joint pairs if the exchange improves the alignment.
+
+    An exchange can be necessary for a robot with mirrored arms.
+    """
     # If a joint exists in one model only, no exchange of pairs makes the two models agree.
     if best.only_a or best.only_b:
         return best
@@ -722,11 +731,12 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
+    """Return an alignment from a search with larger tolerances if the alignment is better, else `best`.
 
     If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
-    This function repeats the search with larger tolerances. The new choices are then used with the normal
-    tolerance, so that the result contains the small differences.
+    This function repeats the search with larger tolerances. Then the function aligns A and B with the choices
+    found and the normal tolerance, so that the result contains the small differences. An alignment is better
+    if its largest difference is less than half of the largest difference of `best`.
     """
     a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
@@ -791,11 +801,11 @@ class _Rule:
     has_effect: bool
 
     def beta_for(self, turn: int) -> float:
-        """Return beta in y = alpha x + beta if `turn` full turns are added to o."""
+        """Return the constant beta of y = alpha x + beta after `turn` full turns are added to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def offset_for(self, beta: float) -> float:
-        """Return the offset o of the joint's zero for which y = alpha x + beta holds."""
+        """Return the joint's zero offset o that gives y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

@@ -1,10 +1,10 @@
 """Describe a robot by its rigid bodies and joint screws in the zero configuration, and align two such robots.
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-pose H are those of the zero configuration, in one common frame. The links between the joints do not occur in
-this product. If links that are fixed to each other are merged or split, the product stays the same. Any body
-may be the root. If the path from the root leads through a joint from its child link to its parent link, the
-joint's screw is reversed.
+link's pose H describe the zero configuration, in one common frame. The links between the joints do not occur
+in this product. If links that are fixed to each other are merged or split, the product stays the same. Any
+body may be the root. The path from the root may cross a joint from the child link to the parent link. In this
+case, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
 different frames for the joint, and different frames for the body after the joint. Let the constant rigid
@@ -12,10 +12,10 @@ motions M and N describe these two differences. A and B move in the same way if
 
     P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
 
-For a floating joint, M and N may be any rigid motions. A planar joint reaches only translations and rotations
-in its plane (planar poses), so M P N must be a planar pose for every planar pose P. If M raises the plane by
-some distance, N must lower the plane by the same distance. If M turns the plane over, N must also turn the
-plane over.
+For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses, which are
+translations and rotations in the joint's plane. Therefore, M P N must be a planar pose for every planar pose
+P. If M raises the plane by some distance, N must lower the plane by the same distance. If M turns the plane
+over, N must also turn the plane over.
 
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
@@ -237,7 +237,7 @@ class Mechanism:
 
     Attributes:
         zero_poses: (4, 4) pose of each link in the root frame, in the zero configuration.
-        orders: Each entry lists consecutive joints whose order `reorder` changed, in their new order.
+        orders: One entry for each call of `reorder`, with the names of the reordered joints in the new order.
         lengths: Length (m) of the path from the root to each link.
     """
 
@@ -428,15 +428,17 @@ class MatchedJoints:
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
             configuration.
-        axis_a: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
-            If A's joint is fixed, `axis_a` is the screw of B's joint.
-        axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. It is equal
-            to `axis_a` unless only the joint axes of A and B differ.
+        axis_a: Screw S of A's joint in the zero configuration. A joint connects two bodies. The motion exp(S
+            t) moves the body that is farther from the base. If A's joint is fixed, `axis_a` is the screw of
+            B's joint.
+        axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. If B's
+            joint axis is displaced without B's later bodies, `axis_b` differs from `axis_a`. In all other
+            cases, `axis_b` is equal to `axis_a`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
-            differ; else "". A planar or floating joint that is reversed in one model also has "kind" if
-            `AlignmentChoices` are given without a conversion for this joint.
+            differ; else "". A planar or floating joint can also have the value "kind". Such a joint is
+            reversed in one model, and the given `AlignmentChoices` contain no conversion for the joint.
         conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
             equal.
     """
@@ -485,7 +487,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy of the pair that counts the two links as different end-effector frames.
+        """Return a copy of the pair in which the two links are different end-effector frames.
 
         The copy stores the pose of B's link relative to A's link in `tool`, and reports no difference.
         """
@@ -539,10 +541,10 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest nonzero difference (m) of matched joints and matched links; 0 if none differ.
+        """Smallest and largest nonzero difference (m) between matched joints or matched links.
 
-        A pair of links counts only if one of the two links has a child joint. Angles are multiplied by
-        `size_of`.
+        If nothing differs, both values are 0. A pair of links is ignored if neither link has a child joint.
+        Angles are multiplied by `size_of`.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -663,9 +665,9 @@ class MatchedValues:
     #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: This value (rad or m) is then the difference of the two constants before this step.
-    #: The rounding error of one joint is subtracted, but the value is at least 0.
-    #: Otherwise, the value is 0.
+    #: In this case, `rounding` (rad or m) is the original difference between the constants of `a` and `b`.
+    #: The rounding error of one joint is subtracted from this difference, down to 0.
+    #: If the functions differ by more than rounding, `rounding` is 0.
     rounding: float = 0.0
 
     @property

@@ -23,8 +23,8 @@ If joint i is the same in A and B, the first three terms are 0. For each directi
 at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
 and d. If A and B differ at several joints, the terms of these joints may be largest in different
 configurations. The sum of the maxima then exceeds the true maximum. If A and B differ only in constant
-motions L, urdfkin also computes a second bound, and uses the smaller bound. The second bound is the sum of
-the distances by which each L can move the frame.
+motions L, urdfkin computes a second bound, and uses the smaller of the two bounds. The second bound is the
+sum of the distances by which each L can move the frame.
 
 **Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
 derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
@@ -144,10 +144,10 @@ class Support:
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
 
-        For each angle (rad), let R be the rotation of the set of points about `axis`. Since h'(u) is
-        h(R^T u), the method rotates the grid points by the opposite angle. `factors` contains a multiplier
-        for each angle, or one multiplier for all angles. The method multiplies the grid points' components
-        perpendicular to the axis by this multiplier.
+        For each angle (rad), let R be the rotation of the set of points about `axis`. Since h'(u) is h(R^T
+        u), the method rotates the grid points by the opposite angle. `factors` contains a multiplier for each
+        angle, or one multiplier for all angles. The multiplier scales the part of each grid point that is
+        perpendicular to the axis.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -222,8 +222,8 @@ def upper_bounds(
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
     The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
-    The bounds are inf if two matched moving joints are of different kinds, or if the difference grows without
-    bound with the value of an unlimited joint.
+    The bounds are inf if two matched moving joints are of different kinds. The bounds are also inf if the
+    difference grows without bound with the value of an unlimited joint.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -313,7 +313,7 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the support functions of d and y (module docstring) after the motions of the next joint."""
+    """Apply the motions of the next joint to the support functions of d and y (module docstring)."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
@@ -331,7 +331,7 @@ def after_joint(
 
 
 def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
-    """Return the support functions of d and y (module docstring) after the constant rigid motion L."""
+    """Apply the constant rigid motion L to the support functions of d and y (module docstring)."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -341,7 +341,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return the support function of d (module docstring) after a joint's motion, without the motion L."""
+    """Apply a joint's motion, but not L, to the support function of d (module docstring)."""
     same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis_a.direction, np.zeros(3))
@@ -403,10 +403,10 @@ def _common_difference(
     second derivative.
 
     Let x be the vector from A's axis to y. Let P be the projection perpendicular to A's axis, and let R be
-    the rotation about A's axis. The symbols x', P' and R' are the same quantities for B's axis. If t' = t +
-    c, the second derivative is R' P' x' - R P x, up to its sign. With the directions u and u' of the axes,
-    the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part
-    of x' - x is the offset of the axes.
+    the rotation about A's axis. Let x', P' and R' be the vector, the projection and the rotation for B's
+    axis. If t' = t + c, the second derivative of (e(S' t') - e(S t)) y with respect to t is R P x - R' P' x'.
+    With the directions u and u' of the axes, the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P'
+    - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes.
 
     If t and t' have different slopes, the second derivative is at most the sum of two terms, one for each
     joint. Each term is the square of the slope of t or t', times the largest distance of y from the joint's
@@ -444,9 +444,10 @@ def _independent_difference(
 ) -> Support:
     """Return the change of d that two revolute joints cause if their angles are treated as independent.
 
-    If A and B have the same axis, the positions of a point in A and B differ at most by the chord of the
-    largest difference of the angles. If the axes differ, the change of d is e(S' t') y - e(S t) y (module
-    docstring). The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
+    If A and B have the same axis, a point has two positions on a circle about this axis. The distance between
+    the two positions is at most a chord of the circle. The chord belongs to the largest difference between
+    the angles in A and B. If the axes differ, the change of d is e(S' t') y - e(S t) y (module docstring).
+    The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -516,7 +517,10 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
-    """Bound the length of d at the base; `vectors` contains d and y at the last joint."""
+    """Return an upper bound on the length of d at the base.
+
+    `vectors` contains the support functions of d and y at the last joint.
+    """
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -529,9 +533,10 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y with respect to a joint's value, without the motion L.
+    """Return the derivatives of d and y with respect to a joint's value.
 
-    The module docstring defines the symbols. The callers apply L to the result.
+    The module docstring defines the symbols. The result does not include the motion L, which the callers
+    apply.
     """
     if step.kind != "turns":
         u, other = step.axis_a.direction, step.axis_b.direction
@@ -574,7 +579,7 @@ def relevant_joints(
 
     A joint before the first difference of the models usually only rotates D. If the joint's variable also
     moves a later joint of the result, the joint changes the length of D. The result begins with the first
-    such joint. If there is none, the result begins with the first joint that differs.
+    such joint. Without such a joint, the result begins with the first joint that differs between A and B.
     """
     steps, pairs = (
         alignment.path(frame.previous),
