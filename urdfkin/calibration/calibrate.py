@@ -6,8 +6,9 @@ two standard deviations are fitted again and written. The other parameters keep 
 `read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
 The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. The
 columns T00 to T23, or T00 to T33, can contain the pose matrix instead of position and orientation. The
-command `urdfkin placement --format csv` writes such matrices. An .npz file contains q (n, nq) and the poses:
-either T (n, 4, 4), or p (n, 3) with an optional quat (n, 4), scalar last.
+command `urdfkin placement --format csv` writes such matrices. An .npz file contains the configurations q (n,
+nq). The poses are in T (n, 4, 4), or the positions are in p (n, 3). The array quat (n, 4) can contain the
+orientations that belong to p, as quaternions, scalar last.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: Each coordinate of the assumed target is the sum of the model's lengths, divided by one of these numbers.
+#: Divisors that define an assumed position of the target on the tip.
+#: A coordinate (m) of this position is the sum of the model's lengths, divided by the coordinate's divisor.
 #: With these divisors, the target hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -91,9 +93,9 @@ class Calibration:
         base_tool_fit: The fit of only base and tool, with the robot's original parameters.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Indices of poorly observable parameters, each with a ratio of two uncertainties.
-            The first is the uncertainty at the measured configurations. It is divided by the uncertainty at
-            the same number of random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to a ratio. The numerator is the
+            parameter's uncertainty at the measured configurations. The denominator is the parameter's
+            uncertainty at the same number of random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
@@ -223,7 +225,8 @@ def calibrate(
     """Fit the parameters of a robot or a table to measured poses.
 
     Afterwards urdfkin loads the written model, and compares the tip's poses with the poses that Pinocchio
-    computes. A URDF is compared at the measured configurations, and a table at q = 0.
+    computes. For a URDF, the poses are compared at the measured configurations. For a table, the poses are
+    compared at q = 0.
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -243,7 +246,7 @@ def calibrate(
             `poses` is None.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
-            Joint values that look like degrees are refused in any case, unless `radians` is True.
+            If joint values look like degrees, `force` has no effect, and `radians` must be True.
         write_all: Whether to write all fitted parameters, including parameters that changed by less than two
             standard deviations.
 
@@ -506,8 +509,9 @@ def _find_poorly_observable(
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio.
 
-    A URDF is compared at the measured configurations, and a table at q = 0. A URDF cannot contain base, tool
-    or gains, so these parameters are 0 in the comparison of a URDF.
+    For a URDF, the poses are compared at the measured configurations. For a table, the poses are compared at
+    q = 0. A URDF cannot contain base, tool or gains. Therefore, these parameters are 0 in the comparison of a
+    URDF.
     """
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:

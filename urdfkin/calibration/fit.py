@@ -6,20 +6,20 @@ parameters. For each singular value, `urdfkin.verify.singular_values` computes a
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
 lower bound, so no tolerance is needed.
 
-The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. The next frame
-can compensate this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
-joint's direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, and 2 of the 6
-parameters of each prismatic joint. All 6 parameters of the tip are identifiable (Everett, Driels and Mooring,
-1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's orientation is
-unknown.
+The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. An opposite
+change of the next frame then leaves the tip's pose unchanged. The frame of a prismatic joint can be shifted
+anywhere and rotated about the joint's direction. Therefore, 4 of the 6 parameters of a revolute joint are
+identifiable. For a prismatic joint, 2 of the 6 parameters are identifiable. All 6 parameters of the tip are
+identifiable (Everett, Driels and Mooring, 1987). If only positions are measured, 3 fewer parameters are
+identifiable, because the tool's orientation is unknown.
 
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
 has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
 projection onto the chosen columns. The length of the remainder measures how independent the column is. A
 column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
 chooses the candidate that comes first in the model's order of preference. The parameter of the chosen column
-is fitted. Without this choice, four parameters of nearly parallel axes would become hundreds of metres and
-cancel each other.
+is fitted. Without this rule for candidates, four fitted parameters of nearly parallel axes could be hundreds
+of metres. The effects of these four parameters would cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -34,17 +34,18 @@ variance of the positions is the sum of the squared position residuals, divided 
 redundancies 1 - H_ii. The variance of the rotations is computed in the same way. The
 estimation is repeated until the estimates are constant (Foerstner's variance components).
 
-A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
-distributed. A position has 3 degrees of freedom, and a full pose has 6. The limit is chosen so that only
-one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
-removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
+A pose is an **outlier** if the statistic r_i^T (1 - H_ii)^-1 r_i is too large. For any other pose, this
+statistic has a chi^2 distribution. The distribution has 3 degrees of freedom for a position, and 6 for a full
+pose. The probability that a data set without outliers exceeds the limit is about 1 %. One outlier can hide
+another, so each step removes only the largest outlier and fits the other poses again. The steps end when no
+outlier is left.
 
 **Start values.** Before the fit, start values of base and tool are computed from the measured poses. The
 robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i
 and R_X be the rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown
-rotations R_B and R_X. Together, R_B and R_X form the null vector of these equations (Shah, 2013). Let p_i be
-the robot's positions. The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown
-translations: x of the tool and b of the base.
+rotations R_B and R_X. The null vector of these equations contains the entries of R_B and R_X (Shah, 2013).
+Let p_i be the robot's positions. Let x be the unknown translation of the tool, and b that of the base. The
+measured positions p_Mi = R_B (R_i x + p_i) + b are linear in x and b.
 
 If only positions are measured, the base and the position of the target on the tip are unknown. If the
 target's position is known, the base's rotation can be computed directly. If the base's rotation is known, the
@@ -73,17 +74,17 @@ from urdfkin.verify.singular_values import singular_values
 
 #: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: A message names at most this number of fitted parameters that have the same effect as a fixed parameter.
+#: Maximum number of fitted parameters that are named in the reason why another parameter stays fixed.
 _MAX_NAMES = 3
-#: A parameter stays fixed if fitted parameters together have the same effect.
-#: A message lists these fitted parameters.
-#: The message omits a fitted parameter that contributes at most this fraction of the effect.
+#: A parameter stays fixed if a combination of fitted parameters has the same effect.
+#: A message lists the fitted parameters of this combination.
+#: The message omits a fitted parameter if its share of the effect is at most this fraction.
 _EFFECT_FRACTION = 1e-6
 
 
 @dataclass(frozen=True)
 class Identification:
-    """The parameters that the measurements identify, and the parameters that stay fixed.
+    """The parameters that can be fitted to the measurements, and the parameters that stay fixed.
 
     Attributes:
         free_parameters: Indices of the fitted parameters, which have linearly independent effects.
@@ -199,7 +200,7 @@ _EIGENVALUE_CUTOFF = 1e-9
 _MAX_NOISE_ESTIMATES = 20
 #: The estimation ends when the relative change of the estimated noise is at most this number.
 _NOISE_CONVERGENCE = 1e-3
-#: Probability that an outlier is reported for a data set without outliers.
+#: Probability that urdfkin reports at least one outlier in a data set without outliers.
 FALSE_ALARM = 0.01
 #: Number of standard deviations above which the change of a parameter is significant.
 SIGMAS = 2.0
@@ -421,7 +422,8 @@ def reject_outliers(
     fit: Fit,
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
-    # Without the outliers, there must still be more measured numbers than parameters.
+    # `most` is the maximum number of outliers.
+    # The other poses must contain more measured numbers than the fit has parameters.
     most = len(measurements) - 1 - -(-len(free_parameters) // fit.residuals.shape[1])
     most = min(int(_MAX_OUTLIER_FRACTION * len(measurements)), most)
     clean = fit
@@ -446,9 +448,9 @@ def select_significant(
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
     Each step resets the least significant parameter to its old value. The covariance determines how the reset
-    of one parameter changes the other parameters. If the measurements determine only a combination of two
-    parameters, resetting one of the two can make the other significant. A `fixed` parameter is always
-    selected. Unknown entries of the covariance are inf.
+    of one parameter changes the other parameters. The measurements may determine only a combination of two
+    parameters. The reset of one of these two parameters can make the other parameter significant. A `fixed`
+    parameter is always selected. Unknown entries of the covariance are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -458,7 +460,8 @@ def select_significant(
         return ~free
     x, C = changes.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative; the parameter then counts as significant.
+        # Rounding may make a small variance 0 or negative.
+        # `MIN_DIVISOR` then replaces the variance, so that the parameter counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], MIN_DIVISOR))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -568,7 +571,7 @@ def _translations(
 
 
 def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
-    """Raise InputError if measured positions spread over 100 times farther than the robot's tip positions."""
+    """Raise InputError if the measured positions have more than 100 times the spread of the tip positions."""
     T = model.chain.poses(measurements.joint_values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)

@@ -2,19 +2,18 @@
 
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
-an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The joint's motion has the angle or length (1 + g) q, where q is the joint's value.
-Let D be the derivative of the tip's pose by this angle or length. The derivative of the tip's pose by g is
-then q D.
+an elementary motion is a parameter or a joint's value. A joint can have a gain g. A joint with the value q
+then moves by the angle or length (1 + g) q. Let D be the derivative of the tip's pose by this angle or
+length. The derivative of the tip's pose by g is then q D.
 
-**URDF.** Each moving joint of the path has six parameters of its origin, and so has a fixed joint directly
-before the tip. Let T be the joint's original origin, and let A be the rotation that maps the z axis to the
-joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
-parameter z always shifts the origin along the joint's axis. A change of rz changes the zero position of a
-revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
-robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
-the tip's frame.
+**URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
+directly before the tip also has six parameters. Let T be the joint's original origin, and let A be the
+rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry)
+Rz(rz) . A^-1. Therefore, the parameter z always shifts the origin along the joint's axis. A change of rz
+changes the zero position of a revolute joint. The other four parameters move the axis. The gain is a seventh
+parameter. A URDF cannot store a gain. `base` and `tool` have six parameters each. The path begins with the
+motions of `base`: the pose of the robot's base in the instrument's frame. The path ends with the motions of
+`tool`: the pose of the target in the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
@@ -49,7 +48,7 @@ class Parameter:
         element: "base", "tool", or the name of a joint.
         name: Parameter of an origin ("x", "rx", ...), "gain", or a cell of a table ("theta", "d", ...).
         unit: "m", "rad", or "" for a gain.
-        is_base_or_tool: True if `element` means the base or the tool; False if it names a joint.
+        is_base_or_tool: True for a parameter of the base or the tool; False for a parameter of a joint.
     """
 
     element: str
@@ -66,11 +65,13 @@ class ParametricMotion(ElementaryMotion):
     """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
-        parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
-            gain that scales the joint's value, or None if the value is not scaled.
-        joint: Index of the joint whose value is the angle or length; None for the motion of a parameter.
-        sense: -1 if the path leads from the joint's child to the joint's parent, or if the table's row
-            subtracts the joint's value; else 1.
+        parameter: Index of the motion's parameter. The parameter of a joint's motion is the gain; None if the
+            joint has no gain.
+        joint: Index of the moving joint in the arrays of joint values; None if the motion belongs to no
+            joint.
+        sense: Sign of the angle or length. The sign is -1 if the path leads from the joint's child to the
+            joint's parent. The sign is also -1 if the table's row subtracts the joint's value. Otherwise the
+            sign is 1.
     """
 
     parameter: int | None
@@ -127,8 +128,8 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        The argument `frames` contains the poses that the method `frames` returns for the same arguments.
-        If it is None, this method computes the poses.
+        The argument `frames` is the result of the method `frames` for the same arguments. If `frames` is
+        None, `poses_and_jacobian` computes this result.
         """
         amounts, factors = self._displacements(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -344,8 +345,8 @@ class _ModelBuilder:
 def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
 
-    A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
-    parameters of the neighbouring moving joints have the same effect.
+    A fixed joint directly before the tip also has parameters. Other fixed joints have no parameters, because
+    the neighbouring moving joints have parameters with the same effect.
     """
     path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0

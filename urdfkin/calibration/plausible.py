@@ -1,11 +1,11 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if the residuals are a large fraction of the robot's reach, or hardly
-smaller than the residuals of the original model. A fit that tilts a joint's axis by a large angle, or that
-has no redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one
-at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
-one.
+joint is reversed. A fit is refused if its rms error is too large. The limits for the position error depend on
+the robot's reach, on the spread of the measured positions, and on the error before the fit. A fit is also
+refused for a large tilt of a joint's axis, a large gain, or missing redundancy. Joint values that look like
+degrees are refused too. To find the reason, the module corrects common mistakes in the data, one at a time,
+and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
 """
 
 from __future__ import annotations
@@ -50,28 +50,30 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Two configurations count as equal if their joint values, rounded to multiples of this number, are equal.
 #: The unit is rad or m.
 _ONE_CONFIGURATION = 1e-6
-#: This number of standard deviations is subtracted from a parameter's change.
-#: The remainder is compared with a limit, so that an uncertain change does not make a fit implausible.
-#: For example, measured positions of a target near an axis leave the tilt of this axis uncertain.
+#: A parameter's change is reduced by this number of its standard deviations, and then compared with a limit.
+#: For this reason, an uncertain change does not make a fit implausible.
+#: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _UNCERTAIN = 5.0
-#: Maximum error after a correction of the data, divided by the error before the correction.
-#: `_NOT_WORSE` applies if the fit is not plausible, or if a joint zero changed by half a turn.
-#: Otherwise `_BETTER` applies.
+#: A correction of the data is accepted only if it multiplies the fit's error by at most this factor.
+#: The factor is `_NOT_WORSE` for a fit that is not plausible or changes a joint's zero by half a turn.
+#: The factor is `_BETTER` for any other fit.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections of the data for which the parameters are fitted again.
-#: The chosen corrections have the smallest errors in a fit of only base and tool.
+#: Number of corrections of the data for which all parameters are fitted again.
+#: Before the choice, only base and tool are computed for every correction.
+#: The corrections with the smallest errors are chosen.
 _MAX_FITS = 4
-#: A possible correction of the data shifts the rows of q relative to the poses by one of these numbers.
+#: Possible numbers of rows by which the rows of q are shifted relative to the poses.
+#: For a positive number, the correct row of q comes later than the row of the pose.
 _SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 
 
 @dataclass(frozen=True)
 class Plausibility:
-    """The reasons why a fit is refused; `reason` is the likeliest mistake and its remedy.
+    """The reasons why a fit is refused.
 
-    `reason` is None if no correction of the data makes the fit plausible. If `is_in_degrees` is True, the fit
-    is always refused.
+    `objections` contains the reasons. `reason` names the likeliest mistake and its remedy; None if no mistake
+    is found. If `is_in_degrees` is True, `force` has no effect, and the fit is refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -95,7 +97,11 @@ class FitWithData:
 
     @cached_property
     def reach(self) -> float:
-        """The largest distance (m) of the tip from the base or any joint axis, in the original model."""
+        """The reach (m) of the original model at the measured configurations.
+
+        The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
+        The reach is at most the sum of the model's lengths.
+        """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
         turning = [k for k, p in enumerate(chain.parameters) if p.name in ("rz", "theta")]
@@ -151,7 +157,7 @@ class FitWithData:
     def half_turn_zeros(self) -> list[str]:
         """Return the joints whose zero changed by about half a turn.
 
-        A reversed sign of the next joint can cause such a change.
+        If the sign of the next joint is reversed in the data, a fit can change a zero by half a turn.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -248,7 +254,7 @@ def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, fl
 class _Correction:
     """The configurations `q` after the correction of one possible mistake.
 
-    Row i of `q` belongs to the pose with the index `first` + i.
+    The first row of `q` belongs to the pose with the index `first`. The next rows belong to the next poses.
     """
 
     reason: str

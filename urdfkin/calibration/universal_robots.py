@@ -2,9 +2,9 @@
 
 The controller stores Denavit-Hartenberg parameters. The angle between two nominally parallel axes of the arm
 is about a milliradian, so their common normal is far away. The parameter d of one row can therefore be
-hundreds of metres, and d of the following rows cancels this offset. The driver's program `ur_calibration`
-shifts the link frames along their axes, so that these large offsets disappear. The program writes the pose of
-each joint in the frame of the previous joint: x, y, z, roll, pitch and yaw.
+hundreds of metres. The parameters d of the next rows then cancel this offset. The driver's program
+`ur_calibration` shifts the link frames along their axes, so that these large offsets disappear. The program
+writes the pose of each joint in the frame of the previous joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
@@ -109,9 +109,9 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all six joints turn about z, as in the current ROS description, the origins in the calibration file
-    replace the joint origins of the URDF. In other URDFs, such as the older ROS description, the joint
-    origins are fitted. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
+    In the current ROS description, all six joints turn about z. For such a URDF, the origins in the
+    calibration file replace the joint origins. For other URDFs, such as the older ROS description, urdfkin
+    fits the joint origins. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
     """
     robot = as_robot(robot)
     origins = read_calibration(path, order)

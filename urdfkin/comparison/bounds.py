@@ -7,13 +7,14 @@ coordinate at a time. The largest distance found by the search is a lower bound.
 between the models. Each term is the largest effect of one difference over all configurations. If the models
 differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. The
 function divides the space of all variables into boxes. Let D(q) = p_B - p_A be the difference of the frame's
-positions in B and A. In a box with middle c and half widths h,
+positions in B and A. Let c be the middle of a box. Let h_i be half the box's width along variable i, and x_i
+the change of variable i from c. Then
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
-Here D_i is the derivative of D with respect to variable i, and M_ij bounds the second derivatives at every
-configuration (`urdfkin.model.mechanisms.upper_bound.curvature`). If the bound of a box is at most the target,
-the box is finished. Otherwise, the box is halved.
+Here D_i is the derivative of D with respect to variable i. For every configuration, M_ij bounds the second
+derivative of D with respect to variables i and j (`urdfkin.model.mechanisms.upper_bound.curvature`). If the
+bound of a box is at most the target, the box is finished. Otherwise, the box is halved.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
 RANDOM_SAMPLES = 512
-#: Number of sampled configurations in which every joint variable is at an end of its range.
+#: Number of random configurations at corners of the joint ranges.
+#: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
 #: For each frame, the search for the largest distance starts at this number of sampled configurations.
 STARTING_POINTS = 4
@@ -59,9 +61,9 @@ PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 class DistanceSearch:
     """Search for the configurations at which two aligned robots differ most.
 
-    If `as_written` is true, the pose of B's root in A's root frame is constant. Otherwise, the pose of B's
-    base link in the frame of A's base link is constant. The base links are the two links at which the search
-    for matching joints starts.
+    The search for matching joints starts at the base link of A and at the base link of B. The pose of B's
+    base link in the frame of A's base link is constant. With `as_written`, the pose of B's root in A's root
+    frame is constant instead.
     """
 
     def __init__(
@@ -79,7 +81,8 @@ class DistanceSearch:
         self.rng = np.random.default_rng(seed)
         #: Pose (4, 4) of B's base link in A's root frame, while A is in its zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: Whether the base link belongs to the same rigid body as the root link, for each robot.
+        #: Two booleans, for A and for B.
+        #: True: the robot's base link belongs to the same rigid body as its root link.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
@@ -232,9 +235,10 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return each frame's distances (m) at values `z` (frames, starting points, values, variables).
+        """Return the distances (m) between each frame in A and in B, at the frame's own values `z`.
 
-        The result has the shape (frames, starting points, values).
+        `z` has the shape (frames, starting points, values, variables). The result has the shape (frames,
+        starting points, values).
         """
         # NumPy rejects the size -1 for an empty array.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -345,8 +349,8 @@ def tighten(
 ) -> float:
     """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
-    `upper` must be a proven bound. The function returns the smallest bound that it proves, or `upper`. The
-    search ends when it proves `target`.
+    `upper` must be a proven bound. The function returns the smallest bound that it proves. If it proves no
+    smaller bound, the function returns `upper`. The function ends when the bound `target` (m) is proven.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
@@ -389,7 +393,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return how often a box must be halved before its bound can be below `upper`."""
+    """Return the number of halvings after which the second-order term of a box's bound is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

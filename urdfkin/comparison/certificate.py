@@ -30,12 +30,12 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, as_json_data, doc, of_length
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
-#: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
+#: Maximum number of boxes in memory during the branch and bound of `recheck`.
 MAX_RECHECK_BOXES = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
 #: The tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
-#: Relative tolerance of a bound, in units of the machine epsilon.
+#: The relative tolerance of a bound is this number times the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
@@ -223,7 +223,8 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", as_json_data(document))
 
 
-#: Attributes of `Sameness` that the certificate contains under the same names.
+#: Attributes of `Sameness` that the certificate contains.
+#: The entries of the certificate have the names of the attributes.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",
@@ -242,10 +243,10 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return a line of text for each wrong statement.
 
-    The check uses the pairs of joints that the certificate states. If the verdict is "differs", the function
-    also matches the joints again. The verdict is wrong if the models do not differ with the new pairs.
-    urdfkin and Pinocchio both compute the distance at the configurations `q_a` and `q_b` of each lower bound.
-    Each upper bound is proven again.
+    The check uses the pairs of joints in the certificate. If the verdict is "differs", the function also
+    searches for other pairs of joints. The certificate is wrong if the verdict for the new pairs is not
+    "differs". For each lower bound, urdfkin and Pinocchio compute the distance at the configurations `q_a`
+    and `q_b`. Each upper bound is proven again.
 
     Raises:
         InputError: the certificate was made for other models, or names an unknown joint or link.
@@ -379,7 +380,10 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return the first error in the certificate's alignment of B with A, or None."""
+    """Return the first error in a certificate's base pose, joint conversions and joint orders.
+
+    Without such an error, return None.
+    """
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])

@@ -52,8 +52,8 @@ Value = float | str
 class ModelChange:
     """One changed attribute, or an element that only one version has.
 
-    `what` is the attribute, for example "origin x", or "" for a new or removed element. If the formats
-    differ, `size` is the size of the change as text.
+    `what` is the attribute, for example "origin x", or "" for a new or removed element. For two versions of
+    different formats, `size` can be a text such as "38.14 mm off", which describes the change.
     """
 
     element: str
@@ -113,11 +113,12 @@ class Changes:
     Attributes:
         sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
-        effects: For each joint whose changes move links, the effect if only this joint is changed.
+        effects: Effects of the changes that move links, one for each changed joint. Each effect is computed
+            with only this joint changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
         rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
-            `changes` does not list this error. None if the files also have other differences; infinite if the
-            bound was not computed.
+            `changes` does not list this error. None if single precision does not explain all differences
+            between the models. Infinite if the bound was not computed.
     """
 
     sources: tuple[str, str]
@@ -318,7 +319,10 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of a change of only this joint, or None."""
+    """Return the effect if only the joint `name` is changed.
+
+    Return None if no frame moves, or if the effect cannot be computed.
+    """
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

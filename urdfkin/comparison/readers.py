@@ -44,7 +44,8 @@ _MAX_CHARACTERS = 200
 class ReaderDifference:
     """A joint that a library and urdfkin read differently.
 
-    `size` is the largest difference between entries of the child link's pose in the parent link's frame.
+    The compared poses are the poses of the child link in the parent link's frame. `size` is the largest
+    difference between two matching entries of these matrices.
     """
 
     joint: str
@@ -88,15 +89,16 @@ def installed_libraries(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare how urdfkin and other libraries (by default all installed ones) read a robot's file.
+    """Compare how urdfkin and other libraries read a robot's file.
 
-    The poses of all links are compared at q = 0 and at random configurations.
+    If `libraries` is None, the function uses all installed libraries that read the file's format. The poses
+    of all links are compared at q = 0 and at random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
         InputError: a library is not installed, or no installed library reads the file's format. The error is
-            also raised if a joint is locked, or if the robot was loaded from MJCF text instead of a file. It
-            is also raised if a variant or an articulation of a USD file was selected.
+            also raised for a robot with a locked joint, and for a robot from MJCF text instead of a file. A
+            robot from a USD file with a selected variant or articulation raises the error too.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
@@ -133,7 +135,7 @@ def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Run a library in a separate process, and compare its poses with `ours`."""
+    """Run a library in a separate process, and compare its link poses with urdfkin's link poses `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -156,7 +158,8 @@ def _compare_reader(
             title, number, "its model contains none of the robot's links", tuple(answer["joints"])
         )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
-    # `load` may add a root joint that the text lacks, so poses are relative to the first common link.
+    # `load` may add a root joint that the text does not contain.
+    # Therefore, the compared poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())

@@ -37,7 +37,8 @@ from urdfkin.system.lazy_import import get_hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: Smallest numbers that are written without a unit prefix (0.9 m) and with a unit prefix (0.1 mm).
+#: A length or angle of at least 0.9 m or 0.9 rad is written without a unit prefix.
+#: A smaller value has the first unit prefix for which the written number is at least 0.1.
 #: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
@@ -68,7 +69,8 @@ class SameQuestion:
 
     `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
     models. With None, the question is whether the models are equivalent. If `strict` is true, the answer is
-    no for models with remarks. The answer is also no if the models are equivalent only after changes of B.
+    no for models with remarks. With `strict`, the answer is also no if only changes of B make the models
+    equivalent.
     """
 
     within: float | None = None
@@ -84,8 +86,8 @@ class Interval:
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding
-            error.
+        lower: Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`,
+            minus the largest rounding error.
         upper: Proven upper bound of the distance, metres; inf if there is no bound.
         radians: Proven upper bound of the angle between the two orientations of the frame.
         radians_seen: The angle between the two orientations at `q_a` and `q_b`.
@@ -103,7 +105,9 @@ class Interval:
     q_b: tuple[float, ...]
 
 
-#: Value of a parameter: a type or name, a number, the ends of a range, several names, or a mimic rule.
+#: Value of a parameter of a joint or link.
+#: A str is a type or a name.
+#: A tuple contains the two limits of a range, several names, or the type and the value of an idle joint.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -118,8 +122,8 @@ class Difference:
         b: The parameter's value in B. None if the parameter has no value.
         radians: Angular part of the difference, radians; 0 if the difference has no angular part.
         metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
-            limits of B were converted to the coordinate of A. Otherwise empty.
+        detail: More about the difference. "alone": the joint's axis differs, but the links after the joint
+            agree. "converted": the limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
     place: str
@@ -215,11 +219,11 @@ class JointDifference:
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
-        what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
-            empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if `b` contains no value.
-        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
-            reason why the models cannot be compared here.
+        what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base".
+            The text is empty if the models cannot be compared at this joint or link.
+        a: The parameter's value in A. None if `b` is not a value of the parameter.
+        b: The parameter's value in B. If `a` is None, `b` describes the difference in words. If the models
+            cannot be compared at this joint or link, `b` is the reason.
         explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
@@ -321,17 +325,18 @@ class Sameness(Displayable):
             cause.
         unlimited: Planar and floating joints of A, and prismatic joints with unlimited travel. All bounds on
             distances hold while each of these joints travels at most 10 m.
-        single: (m, rad) bound on the distance and the angle between matching frames that single precision can
-            cause. None if no file has single precision.
-        unexplained: Differences of the unchanged models at one joint or link that rounding does not explain.
-            The numbers of a USD file are rounded to single precision.
-        frames: For each pair of matching links, an interval that contains the largest distance after the
-            changes in `after`.
+        single: (m, rad) largest distance and angle between matching frames that rounding to single precision
+            can cause. None if no file has single precision.
+        unexplained: Differences between the unchanged models, each at one joint or link. Rounding does not
+            explain these differences. The numbers of a USD file are rounded to single precision.
+        frames: One interval for each pair of matching links. The interval contains the largest distance
+            between the two links, after B is changed as in `after`.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
-        bound_as_written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames,
-            for the models as they are written. The bound is infinite if no bound was proven. If one model is
-            a Denavit-Hartenberg table, only frames with the same name in A and B count.
+        bound_as_written: (m, rad) proven bounds on the distance and on the angle between matching frames of
+            the unchanged models. The bounds hold for all pairs of matching frames. The bounds are infinite if
+            no bounds were proven. If one model is a Denavit-Hartenberg table, only frames with the same name
+            in A and B count.
         narrowed: One line of text for each mimicked joint whose range contains values at which a mimic joint
             exceeds its limits. The distances in `frames` are computed for the whole range of the mimicked
             joint.
@@ -431,8 +436,8 @@ class Sameness(Displayable):
         """Whether the models differ, but single precision can explain the displacement of every frame.
 
         The models are compared as they are written. The limit is the sum of the rounding errors of all
-        joints. A real error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves
-        that rounding is the cause.
+        joints. A wrong number in one joint can move a frame by less than this limit. Therefore, only
+        `up_to_single` proves that rounding is the cause.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -448,7 +453,7 @@ class Sameness(Displayable):
         )
 
     def within(self, most: float) -> bool:
-        """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
+        """Return whether distance (m) and angle (rad) of all matching frames are proven to be at most `most`.
 
         The models are compared as they are written: their roots coincide, and their coordinates are equal. A
         different base pose, a different tool frame, or a different zero position of a joint can therefore
@@ -477,11 +482,11 @@ class Sameness(Displayable):
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """Return 0 if the models are equivalent, or within the given distance; else 1.
+        """Return the exit code: 0 if the models are equivalent or within the given distance, else 1.
 
         Args:
-            strict: If true, the result is 1 for models with remarks, such as different joint limits. The
-                result is also 1 if the models are equivalent only after changes of B.
+            strict: If true, the exit code is 1 for models with remarks, such as different joint limits. With
+                `strict`, the exit code is also 1 if only changes of B make the models equivalent.
             within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
                 are written.
 
@@ -495,8 +500,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
 
-        If the models are equivalent, their poses at corresponding configurations are equal, except for `base`
-        and `tools`. A coordinate that only B has is set to its value in the neutral configuration.
+        If the models are equivalent, A at q and B at the converted q have equal poses, except for differences
+        in `base` and `tools`. A coordinate that only B has is set to its value in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -529,12 +534,12 @@ class Sameness(Displayable):
         """Return a convention for A with the names, order, directions and zero offsets of B's joints.
 
         A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. If
-        the models are equivalent, their poses at q and at the converted q are equal, except for `base` and
-        `tools`.
+        the models are equivalent, A at q and B at the converted q have equal poses, except for differences in
+        `base` and `tools`.
 
         Raises:
-            InputError: a coordinate of one model has no matching coordinate in the other model, or a planar
-                or floating joint has different frames in A and B.
+            InputError: a coordinate of one model has no matching coordinate in the other model. The error is
+                also raised if a planar or floating joint has different frames in A and B.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
@@ -768,8 +773,8 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    # `same` can store a mimic joint with the multiplier 0 as a fixed joint.
-    # The child link of such a fixed joint is not a tool.
+    # `same` can replace a mimic joint with the multiplier 0 by a fixed joint.
+    # The child link of this fixed joint is not treated as a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
             return False
@@ -861,7 +866,8 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return the differences that do not affect motion.
 
-    `single` is the relative error of a number in single precision, or 0.
+    `single` is the relative error of a number in single precision. It is 0 if both models have double
+    precision.
     """
     some = list[Difference]()
     for step in alignment.steps:
@@ -873,7 +879,8 @@ def remarks(
         for lock in filter(None, map(is_idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
-    # A joint can be independent in B and a mimic joint in A, although all joint values agree.
+    # A joint can be a mimic joint in A and independent in B, although all joint values agree.
+    # For example, the mimic rule in B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.coordinates.get(b.name)
@@ -904,9 +911,10 @@ def limit_differences(
 ) -> Iterator[Difference]:
     """Yield the differences between two joints' kinds and limits.
 
-    `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
-    relative error of a limit in single precision, or 0. With `zero` = (sign, offset), the joint's value in B
-    is sign * (value in A) + offset.
+    `tolerance` is a relative tolerance for limits. If both limits have absolute values below 1 (rad or m),
+    `tolerance` is an absolute tolerance. `single` is the relative error of a limit in single precision. It is
+    0 if both models have double precision. With `zero` = (sign, offset), the joint's value in B is sign *
+    (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

@@ -62,11 +62,11 @@ from urdfkin.verify.verifier import as_verify
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: The same number limits the frames whose largest distance is searched in the unchanged models.
+#: For the unchanged models, the search for the largest distance also uses at most this number of frames.
 MAX_FARTHEST_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 MAX_PATH_LENGTH = 1e150
-#: An upper bound is sharp enough if it is at most this factor times the largest distance found.
+#: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
 
 
@@ -81,26 +81,26 @@ def same(
 ) -> Sameness:
     """Decide and prove whether two models move alike in every configuration.
 
-    By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, the motion of a link depends on the
-    screws S_i of the joints and on the link's pose H in the zero configuration. If the screws and poses of
-    two models agree, the models move alike for all q. The models may still have different base poses, fixed
-    links, joint zeros, joint directions, names, coordinate orders and tool frames.
+    The product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H is the pose of a link. Here S_i are the
+    screws of the joints, and H is the link's pose in the zero configuration. If two models have equal screws
+    S_i and equal poses H, the models move alike for all q. The models may still have different base poses,
+    fixed links, joint zeros, joint directions, names, coordinate orders and tool frames.
 
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
-        map: Joint names of `a`, each with the name of the matching joint in `b`. Give the joints that urdfkin
-            cannot match by names and axes.
-        bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
-            most of the computing time.
+        map: Joint names of `a`, each with the name of the matching joint in `b`. Only joints that urdfkin
+            cannot match by names and axes need an entry.
+        bounds: Whether to bound the largest distances between frames. If the models differ, the computation
+            of the bounds takes most of the time.
         boxes: Maximum number of boxes of configurations that exist at the same time in branch and bound.
             Boxes give sharper bounds if the models differ in many places. With 0, no boxes are used.
-        within: Distance (metres and radians) that you will pass to `Sameness.within`. The boxes are then used
-            to prove that all frames are within this distance.
+        within: Limit (m and rad) that you will pass to `Sameness.within`. Branch and bound then tries to
+            prove that the distance (m) between all matching frames is at most this limit.
 
     Returns:
-        The verdict, the map of joints and links, the differences, and for every frame an interval that
-        contains its largest distance over all configurations within limits.
+        The verdict, the matched joints and links, the differences, and an interval for every frame. The
+        interval contains the frame's largest distance over all configurations within limits.
 
     Raises:
         UrdfError: a model has errors.
@@ -122,8 +122,8 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # The comparison stores compiled trees in the robots that it uses.
-    # `same` therefore copies the user's robots.
+    # The comparison caches compiled trees in its robots.
+    # Therefore, `same` uses copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -307,7 +307,7 @@ class Comparator:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
         # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
-        # For a table, only links with equal names in A and B are therefore compared.
+        # Therefore, a comparison with a table uses only links with equal names in A and B.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -331,8 +331,8 @@ class Comparator:
 
         `same` ignores a small rounding difference at each joint. These differences add up along the path. If
         an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
-        and the frame. The bound of the distance therefore holds only while each joint of `unlimited` travels
-        at most `ASSUMED_LIMIT`.
+        and the frame. Therefore, the bound on the distance assumes that each joint in `Sameness.unlimited`
+        travels at most `ASSUMED_LIMIT`.
         """
         pairs = [
             (step.kind, pair)
@@ -371,7 +371,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) on the distances of all frames of the unchanged models."""
+        """Return bounds on distance (m) and angle (rad) of all matching frames of the unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -420,7 +420,8 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If no position differs by more than rounding, the frame with the largest bound on the angle is used.
+        # If all positions agree up to rounding, only one frame is searched.
+        # This frame has the largest upper bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -493,7 +494,10 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each matched joint that translates, and its largest travel (m); infinite without limits."""
+    """Yield each matched joint that translates, and the joint's largest travel (m).
+
+    The travel is infinite for planar and floating joints, and for prismatic joints without limits.
+    """
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
             yield step, math.inf
@@ -507,7 +511,7 @@ def _joints_fixed_in_one(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the fixed joints that match, by name or child link, a moving joint of `other`."""
+    """Return indices of the fixed joints whose name or child link belongs to a moving joint of `other`."""
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
     children = {
@@ -604,9 +608,9 @@ class JointComparison:
     """Prove joint by joint that single precision is the cause of every difference between two models.
 
     The rounding errors of all joints add up in the pose of a frame. A wrong number in one joint can move a
-    frame by less than this sum. The pose of a frame therefore does not reveal every wrong number. For this
-    reason, the proof compares the models joint by joint. Each joint may differ only by the rounding of the
-    numbers that define this joint.
+    frame by less than the sum of these errors. A comparison of frame poses does not detect this wrong number.
+    For this reason, the proof compares the models joint by joint. Each joint may differ only by the rounding
+    of the numbers that define this joint.
 
     **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
     may shift the origin of a joint along the joint's axis, and a converter may add or merge fixed links. The
@@ -619,15 +623,16 @@ class JointComparison:
     - the multiplier and the offset of each mimic rule.
 
     By the product of exponentials, these quantities determine the pose of each common link in every
-    configuration. The models are compared as they are written: the roots of A and B coincide, and no joint
+    configuration. The models are compared as they are written. The roots of A and B coincide. No joint
     direction, joint zero or tool frame is changed.
 
-    **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding can shift the
-    frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
-    `urdfkin.verify.usd_check.bound_single_precision_errors` computes w_i and e_i from the numbers of joint i.
-    Let R_i be the constant rotation of joint i, and p_i the position of its origin. Let R*_i and p*_i be the
-    exact values. The angle of a product of rotations is at most the sum of their angles. The angle between
-    the product R_1 ... R_n and the product R*_1 ... R*_n is therefore at most
+    **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding of the numbers of
+    joint i can shift and rotate the frame after joint i. Let w_i be the largest shift (m), and e_i the
+    largest rotation (rad). The function `urdfkin.verify.usd_check.bound_single_precision_errors` computes w_i
+    and e_i from the numbers of joint i. Let R_i be the constant rotation of joint i, and p_i the position of
+    its origin. Let R*_i and p*_i be the exact values. The angle of a product of rotations is at most the sum
+    of their angles. The angle between the product R_1 ... R_n and the product R*_1 ... R*_n is therefore at
+    most
 
         e_1 + ... + e_n.
 
@@ -637,31 +642,32 @@ class JointComparison:
         W + E |p_i| + w_i.
 
     The reason is the equation R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes
-    through the origin of the frame after the joint, and is fixed in this frame. Therefore, the errors of the
-    axis are at most the position error and the rotation error of this frame. The multiplier and the offset of
-    a mimic rule have a relative error of at most 2^-24.
+    through the origin of the frame after the joint, and is fixed in this frame. Therefore, the position error
+    of the axis is at most the position error of this frame. The direction error of the axis is at most the
+    rotation error of this frame. The multiplier and the offset of a mimic rule have a relative error of at
+    most 2^-24.
 
-    In B, P need not be an ancestor of the compared link: the paths to P and to the link may branch at a
-    common ancestor. Let W and E be the position error and the rotation error of the link relative to this
+    In B, the compared link can be on another branch than P. Then the two branches begin at a common ancestor
+    of P and the link. Let W and E be the position error and the rotation error of the link relative to this
     common ancestor. Let V and F be the position error and the rotation error of P relative to the common
     ancestor. Let d be the distance between the link and P. Then the position error of the link relative to P
-    is at most W + V + F d, and the rotation error is at most E + F. `same` ignores the rounding errors of
-    double precision, so these errors are added to the bounds. If both models are rounded, the bounds of both
-    models are added.
+    is at most W + V + F d. The rotation error of the link relative to P is at most E + F. `same` ignores the
+    rounding errors of double precision, so these errors are added to the bounds. If both models are rounded,
+    the bounds of both models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
-    joint's parent may be a link that only B has. Or other joints may lie between P and this joint in B.
-    Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded, the
-    path from P to the link must have at most one moving joint. The second model must then have no rounded
-    numbers on the path from the common ancestor to P. If a condition does not hold, `same` reports the
-    difference as not explained.
+    joint's parent may be a link that only B has. As another example, B may have other joints between P and
+    the joint. Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is
+    rounded, two conditions must hold. The path from P to the link has at most one moving joint. In the second
+    model, the joints between the common ancestor and P have no rounded numbers. If a condition does not hold,
+    `same` reports the difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
     smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
     detect this error. The proof does not cover planar joints, floating joints, joints in another order, and
-    links on different branches of A and B. These joints and links must agree up to double precision. `same`
-    reports a larger difference of such a joint or link as not explained.
+    links on different branches of A and B. These joints and links must agree up to double precision. If one
+    of these joints or links has a larger difference, `same` reports the difference as not explained.
 
     `errors` contains an array (joints, 3) of error bounds for A, and an array for B. The columns are the
     position error (m), the rotation error (rad), and the relative error of the mimic rule. The bounds are 0
@@ -705,7 +711,10 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P, the link's nearest ancestor that both models have, and the joints between."""
+        """Return P and the joints from P to the link.
+
+        P is the link's nearest ancestor that both models have.
+        """
         joints, path = self.trees[0].joints, list[int]()
         while link:
             path.insert(0, link - 1)
@@ -715,7 +724,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints from the last common ancestor to `start`, and those to `end`."""
+        """Return two lists: the joints from the last common ancestor to `start`, and the joints to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -734,7 +743,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # `paths[1][0]` contains the joints of B between the common ancestor and P.
+        # The list `paths[1][0]` contains the joints of B from the last common ancestor to P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -767,9 +776,10 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle (rad) between two axes, and the distance (m) from a point of one to the other.
+        """Return the angle (rad) and the distance (m) between two joint axes.
 
-        For a prismatic joint, the distance is 0, because the axis has only a direction.
+        The distance is that of a point on one axis from the other axis. For a prismatic joint, the distance
+        is 0, because the axis has only a direction.
         """
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -779,8 +789,8 @@ class JointComparison:
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
         """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
 
-        Both joint lists begin at the last common ancestor. `back` lists the joints from this ancestor to P,
-        and `path` lists the joints from this ancestor to the link.
+        Both lists of joints begin at the last common ancestor. The joints in `back` lead to P. The joints in
+        `path` lead to the link.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

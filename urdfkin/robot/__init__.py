@@ -96,15 +96,15 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or text must contain all names. A text that begins with the name of a pose needs only the
-    changed values.
+    A mapping or text must contain all names. If a text begins with the name of a pose, the text needs only
+    the values that differ from the pose.
 
     Methods that compute a quantity share these arguments:
 
     - `q`: (..., nq) rad, m.
-    - `v`: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
-      frame.
-    - `a`: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
+    - `v`: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is expressed in the axes of the
+      moving frame.
+    - `a`: (..., nv) rad/s^2, m/s^2; expressed in the same axes as `v`.
     - `frame`: Name of a link or joint; None: the robot's only tip. For a list of names, such as
       `link_frames`, the result has an axis of frames after the batch axes.
     - `reference`: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's origin, in
@@ -114,8 +114,8 @@ class Robot(Displayable):
       error.
     - `verify`: True: check the call with Pinocchio. "sample": check 100 configurations of the call. False: no
       check. None: as chosen in `load`.
-    - `threads`: Number of threads for a batch. None: one thread below 4,096 configurations, otherwise one for
-      each processor. The result does not depend on the number of threads.
+    - `threads`: Number of threads for a batch. None: one thread for fewer than 4,096 configurations,
+      otherwise one thread for each processor. The result does not depend on the number of threads.
 
     These methods share these errors:
 
@@ -125,8 +125,8 @@ class Robot(Displayable):
 
     Attributes:
         tree: Links and joints.
-        verifier: Verifier of the robot's results, with the URDF text that Pinocchio reads, and the record of
-            all checks so far.
+        verifier: Verifier of the robot's results. The verifier contains the URDF text that Pinocchio reads,
+            and the record of all checks so far.
         findings: Warnings and notes about the URDF; `load` rejects a URDF with errors.
         base_frame: Default base of chains: the base named in the catalogue of robots; for other robots, the
             root link.
@@ -385,7 +385,7 @@ class Robot(Displayable):
     def tip_frame(self) -> str:
         """The default tip: the tip in the robot catalogue, or a leaf link.
 
-        The leaf link is the one with the largest number of moving joints between it and the root.
+        The leaf link has the most degrees of freedom on the path from the root to this link.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -480,9 +480,9 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
-        The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
-        both its own limits and the limits of its mimic joint. In this case, the configurations respect only
-        the limits of the mimicked joint. `limit_violations` then reports the mimic joint.
+        The same seed gives the same configurations. In some robots, every value of a mimicked joint exceeds
+        the limits of this joint or of its mimic joint. In this case, the configurations respect only the
+        limits of the mimicked joint. `limit_violations` then reports the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -517,7 +517,8 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # `warn=False` prevents a warning of values in degrees, because the returned lines mention degrees.
+        # The returned lines mention values that are probably in degrees.
+        # `warn=False` prevents an additional warning about such values.
         q = configuration.parse_finite(self.tree, q, "q", warn=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -529,8 +530,8 @@ class Robot(Displayable):
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
-                frame.
+            v: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is expressed in the axes of
+                the moving frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -560,8 +561,8 @@ class Robot(Displayable):
             end: (..., nq) rad, m.
 
         Returns:
-            (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
-            frame.
+            (..., nv) rad/s, m/s. The velocity of a planar or floating joint is expressed in the axes of the
+            moving frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -890,9 +891,9 @@ class Robot(Displayable):
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
         In LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in
-        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. The linear part of the spatial
-        acceleration is the linear part of the classical acceleration minus the cross product of the angular
-        and the linear velocity. J a + J-dot v does not contain the acceleration that a moving base causes.
+        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. Let w be the angular velocity and p' the
+        linear velocity of the frame. The linear part of the spatial acceleration is that of the classical
+        acceleration minus w x p'. J a + J-dot v does not contain the acceleration that a moving base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -912,7 +913,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the kinematic Hessian H (..., 6, nv, nv), the derivative of `jacobian` by each coordinate.
+        """Return the kinematic Hessian H (..., 6, nv, nv), which contains the derivatives of `jacobian`.
 
         H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. The sum of
         H[..., j] v[j] over all j is J-dot of eq. 7.126. The product v^T H v is the part of the acceleration
@@ -993,8 +994,9 @@ class Robot(Displayable):
         """Return the readings of an IMU in a frame (..., 6), in the frame's own axes.
 
         The first three numbers are the accelerometer's reading, the *proper* acceleration R^T (p'' - g) in
-        m/s^2, with the classical acceleration p'' (eq. 7.130). At rest, the proper acceleration is 9.81 m/s^2
-        upwards. The last three numbers are the gyroscope's reading, R^T w in rad/s (eq. 7.127).
+        m/s^2. Here p'' is the classical acceleration (eq. 7.130), and g is gravity. At rest, the proper
+        acceleration is 9.81 m/s^2 upwards. The last three numbers are the gyroscope's reading, R^T w in rad/s
+        (eq. 7.127).
 
         Args:
             gravity: (3,) m/s^2 in world axes.
@@ -1103,8 +1105,8 @@ class Robot(Displayable):
 
         Raises:
             RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. In a checked
-                call, a distance below the rounding error of the rotation (about 1e-13 rad) raises the error
-                too. A quaternion has no singularity.
+                call, the smallest accepted distance is at least the rounding error of the rotation (about
+                1e-13 rad). A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1217,11 +1219,11 @@ class Robot(Displayable):
     ) -> Enclosures:
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding, for the decimals in
-        the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of an interval are doubles.
-        Nearly always, no other double lies between the two ends. The result also states whether urdfkin's and
-        Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each joint between
-        the root link and the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding. They are computed for
+        the decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of an interval
+        are doubles. Nearly always, no other double lies between the two ends. The result also states whether
+        urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each
+        joint between the root link and the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1339,14 +1341,14 @@ class Robot(Displayable):
             reference: Reference frame of velocities, accelerations and Jacobians.
             form: Source of the pose: "tree": the joints of the URDF. "dh": the Denavit-Hartenberg table from
                 `base_frame` to the frame. "screws": the product of exponentials from `base_frame` to the
-                frame. Results of "dh" and "screws" are in the axes of `base_frame`.
+                frame. With "dh" and "screws", `base_frame` takes the place of the world frame.
             name: Prefix of the function names; None: the names of the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code contains the word UNVERIFIED.
 
         Raises:
             UnknownNameError: the language, frame, quantity, reference or form does not exist.
-            InputError: no quantity is given, or one that cannot be exported.
+            InputError: `quantities` is empty, or contains a quantity that cannot be exported.
             VerificationError: Pinocchio's result differs by more than the bound.
 
         >>> import urdfkin
@@ -1472,20 +1474,22 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
                 tool transform leads from the flange to the tip.
-            parallel_offset: Where consecutive parallel joint axes have their offsets d along the axes.
-                "last": the row of the last axis contains the sum. "first": the row of the first axis contains
-                the sum. "each": each row contains the offset of its own link.
+            parallel_offset: Rule for the offsets d of consecutive parallel axes. "last": the row of the last
+                axis contains the sum of the offsets. "first": the row of the first axis contains the sum.
+                "each": each row contains the offset of its own link.
             flip: Names of joints whose positive direction is reversed in the table.
             first: "base": d_1 and theta_1 contain the transform from the base to the first axis if possible.
                 "joint": d_1 and theta_1 are 0, and the table's base contains this transform (Craig's choice).
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
-            slide: Position of the axes of prismatic joints. "drawn": the axis passes through the joint's
-                origin in the URDF. "minimal": the axis passes through the origin of the next revolute joint,
-                so that a is 0.
-            like: A published table. The returned table has the same frames, positive joint directions and
-                zero positions as the published table. With `like`, the arguments `flip`, `first`, `last`,
-                `sign` and `parallel_offset` must have their default values.
+            slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
+                joint's origin in the URDF. "minimal": the axis passes through the origin of the next joint,
+                or of the previous joint, if that joint is revolute. The length a between these two axes is
+                then 0.
+            like: A published table. The returned table has the published table's positive joint directions,
+                directions of x, and offsets along parallel axes. The first and the last joint have the
+                published table's zero positions. All other numbers come from the URDF. With `like`, the
+                arguments `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    The methods have the same names and arguments as the methods of `Robot`. q, v and a, the columns of
-    Jacobians and the rows of six-vectors have the target program's order; q, v and a also have the target
-    program's units. Pinocchio checks each result before the result is converted.
+    The methods have the same names and arguments as the methods of `Robot`. The target program's order
+    applies to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's
+    units apply to q, v and a. Pinocchio checks each result before the conversion.
 
     Attributes:
         robot: The robot.

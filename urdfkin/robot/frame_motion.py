@@ -40,8 +40,8 @@ class MotionCheck:
 
     Attributes:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
-            eps is the machine epsilon. scale is an upper bound on the sum of the absolute values of the terms
-            of a number (`urdfkin.verify.bounds`).
+            The factor eps is the machine epsilon. The factor scale bounds the sum of the absolute values of a
+            number's terms (`urdfkin.verify.bounds`).
         bound_ratio: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
         bound: (n,) largest difference that rounding can cause, divided by the same eps * scale.
     """
@@ -62,7 +62,7 @@ class FrameMotion:
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
-        active_entries: (6, nv) booleans. False: this entry of the Jacobian is 0 in every configuration.
+        active_entries: (6, nv) booleans; False for an entry of the Jacobian that is 0 in every configuration.
         breakdown: Contributions to the acceleration, for each joint and each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.

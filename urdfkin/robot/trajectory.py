@@ -1,18 +1,18 @@
-"""Make trajectories: straight lines between two configurations, or samples from a CSV or .npz file.
+"""Make trajectories from two configurations, or from the samples in a CSV or .npz file.
 
-*Line.* A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and
-ends at rest, and the acceleration is continuous.
+*Line.* Let u = t / duration. A straight line between two configurations is parameterised by s = 10 u^3 - 15
+u^4 + 6 u^5. The motion starts and ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file does not contain are computed by central differences of the
-configurations, with an error proportional to the square of the time step. Joint accelerations that are
+configurations. The error is proportional to the square of the time step. Joint accelerations that are
 computed from configurations have larger errors at the start and the end of the trajectory. The errors at the
 start and the end are proportional to the time step. To estimate all errors, the differences are also computed
 from every second sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
-The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
-change of orientation. Central differences would turn a jump into a large, wrong velocity. Therefore, the
-jumps are removed first.
+At the end of this range, a wrapped angle jumps by one turn. The quaternion of a floating joint may change its
+sign without a change of orientation. Central differences would turn a jump into a large, wrong velocity.
+Therefore, the jumps are removed first.
 """
 
 from __future__ import annotations
@@ -143,8 +143,8 @@ class Trajectory:
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates_source: How v and a were obtained, such as "by central differences".
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a are
-            approximate, or come from a file; see `errors`.
+        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a were
+            read from a file or computed by central differences.
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
@@ -190,9 +190,9 @@ def make_line_trajectory(
 ) -> Trajectory:
     """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
 
-    A planar or floating joint moves along one screw axis, with a rotation of at most half a turn. A
-    continuous joint moves by `end - start`, even by more than one turn. `duration` is in seconds, and
-    `samples` counts both ends.
+    A planar or floating joint makes a screw motion about a fixed axis. The rotation of this screw motion is
+    at most half a turn. A continuous joint moves by `end - start`, even by more than one turn. `duration` is
+    in seconds. `samples` is the number of samples, including the first and the last sample.
     """
     duration = as_finite_float(duration, "the duration")
     samples = as_int(samples, "samples", 0)
@@ -233,8 +233,9 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file has no a, or neither v nor a, central differences
-    replace the missing arrays. Before v is computed, the angles of continuous, planar and floating joints are
+    Without t, the samples are one second apart. If the file contains no joint accelerations, they are
+    computed by central differences. If the file contains no joint velocities either, both are computed by
+    central differences. Before v is computed, the angles of continuous, planar and floating joints are
     unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report these computations.
 
     Args:
@@ -244,8 +245,9 @@ def read_trajectory(
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: the header is missing; a column or array is unknown, missing or duplicate; a cell is not a
-            number; a unit does not fit; time does not increase; or there are too few samples.
+        InputError: the header is missing, or a column or an array is unknown, missing or duplicate. Other
+            reasons: a cell is not a number, a unit is wrong, time does not increase, or there are too few
+            samples.
         UnknownNameError: the convention does not exist.
 
     >>> import urdfkin
@@ -362,7 +364,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Map the name of each number of q, v or a to its unit, such as "m/s"; "" for quaternions."""
+    """Return the unit of each number of q, v or a by name, such as "m/s". A quaternion has the unit ""."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -535,7 +537,7 @@ def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
 
 
 def count_cells(text: str, where: str) -> int:
-    """Return the number of cells in the first line that `_rows` does not skip, or 0 without such a line."""
+    """Return the number of cells in the first line that `_rows` yields, or 0 if `_rows` yields no line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -599,7 +601,8 @@ def _check_columns(
 #: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
-#: A rotation in the opposite direction leads to the same pose, and its angle is less than twice as large.
+#: A rotation in the opposite direction leads to the same pose.
+#: The angle of this opposite rotation is then less than twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.
