@@ -1489,7 +1489,7 @@ class Robot(Displayable):
             like: A published table. The returned table has the published table's positive joint directions,
                 directions of x, and offsets along parallel axes. The first and the last joint have the
                 published table's zero positions. All other numbers come from the URDF. With `like`, the
-                arguments `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
+                arguments `flip`, `first`, `last`, `sign` and `parallel_offset` must be the defaults.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
