@@ -1,8 +1,10 @@
 """An interval contains the true value, which fractions and mpmath compute."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -176,3 +178,27 @@ def test_a_ball_with_a_too_large_radius_has_no_decimal() -> None:
         assert format_decimal(arb(1.0, 1e-19), 1.0) is None
         assert format_decimal(arb(0.0, 1e-19), 1e-12) is None
         assert format_decimal(arb(0.0, 1e-19), 1e-3) == "0"
+
+
+def test_a_second_thread_waits_until_the_first_thread_no_longer_needs_its_precision() -> None:
+    first_entered, second_entered, leave = Event(), Event(), Event()
+
+    def first() -> None:
+        with precision(15):
+            first_entered.set()
+            leave.wait(30.0)
+
+    def second() -> None:
+        with precision(300):
+            second_entered.set()
+
+    with ThreadPoolExecutor(2) as pool:
+        results = [pool.submit(first)]
+        assert first_entered.wait(30.0)
+        results.append(pool.submit(second))
+        entered_early = second_entered.wait(0.2)
+        leave.set()
+        for result in results:
+            result.result(30.0)
+    assert not entered_early
+    assert second_entered.is_set()
