@@ -318,7 +318,7 @@ class Comparator:
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="also map the joints that carry these two joints, or remove this pair",
+                    remedy="also map the parent joints of these two joints, or remove this pair of joints",
                 )
 
     def search(
@@ -707,7 +707,7 @@ class JointComparison:
         for step in self.alignment.steps:
             yield from self._rule_differences(step)
             if step.a not in compared:
-                why = "carries no link that both models have"
+                why = "no link after this joint has a matching link in the other model"
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
