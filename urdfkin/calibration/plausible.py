@@ -50,11 +50,12 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Two configurations count as equal if their joint values, rounded to multiples of this number, are equal.
 #: The unit is rad or m.
 _ONE_CONFIGURATION = 1e-6
-#: A parameter's change is reduced by this number of its standard deviations, and then compared with a limit.
+#: Number of standard deviations that are subtracted from a parameter's change.
+#: The remainder is compared with a limit.
 #: For this reason, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _UNCERTAIN = 5.0
-#: A correction of the data is accepted only if it multiplies the fit's error by at most this factor.
+#: An accepted correction of the data multiplies the fit's error by at most this factor.
 #: The factor is `_NOT_WORSE` for a fit that is not plausible or changes a joint's zero by half a turn.
 #: The factor is `_BETTER` for any other fit.
 _BETTER, _NOT_WORSE = 0.25, 1.5

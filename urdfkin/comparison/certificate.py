@@ -180,7 +180,10 @@ class SameCertificate(Header):
     links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
     tools: Annotated[
         list[ToolEntry],
-        doc("Pairs of matched links with different poses on the same rigid body: different tools."),
+        doc(
+            "Pairs of matched links with different poses on the same rigid body. `same` reports the links of"
+            " a pair as different tools."
+        ),
     ]
     orders: Annotated[
         list[list[str]], doc("Consecutive joints of B whose order was changed, in the new order.")
@@ -494,7 +497,10 @@ def _interval_errors(
             proven = tighten(search, frame, metres, proven[0], MAX_RECHECK_BOXES), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
-    yield f"{place}: its upper bound is not proven; proven are {proven[0]:.6g} m and {proven[1]:.6g} rad"
+    yield (
+        f"{place}: its upper bound is not proven; the proven bounds are {proven[0]:.6g} m and"
+        f" {proven[1]:.6g} rad"
+    )
 
 
 def _lower_bound_errors(

@@ -122,7 +122,7 @@ class Difference:
         b: The parameter's value in B. None if the parameter has no value.
         radians: Angular part of the difference, radians; 0 if the difference has no angular part.
         metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: More about the difference. "alone": the joint's axis differs, but the links after the joint
+        detail: Details of the difference. "alone": the joint's axis differs, but the links after the joint
             agree. "converted": the limits of B were converted to the coordinate of A. Otherwise empty.
     """
 

@@ -656,11 +656,11 @@ class JointComparison:
     the bounds of both models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
-    joint's parent may be a link that only B has. As another example, B may have other joints between P and
-    the joint. Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is
-    rounded, two conditions must hold. The path from P to the link has at most one moving joint. In the second
-    model, the joints between the common ancestor and P have no rounded numbers. If a condition does not hold,
-    `same` reports the difference as not explained.
+    joint's parent may be a link that only B has. B may also have additional joints between P and the joint.
+    Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is rounded, two
+    conditions must hold. The path from P to the link has at most one moving joint. In the second model, the
+    joints between the common ancestor and P have no rounded numbers. If a condition does not hold, `same`
+    reports the difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is

@@ -233,9 +233,9 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file contains no joint accelerations, they are
-    computed by central differences. If the file contains no joint velocities either, both are computed by
-    central differences. Before v is computed, the angles of continuous, planar and floating joints are
+    Without t, the samples are one second apart. Joint accelerations that the file lacks are computed by
+    central differences. If the file lacks joint velocities too, urdfkin computes velocities and accelerations
+    by central differences. Before v is computed, the angles of continuous, planar and floating joints are
     unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report these computations.
 
     Args:
