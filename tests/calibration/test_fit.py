@@ -244,7 +244,9 @@ def test_a_joint_without_motion_in_the_poses_is_reported() -> None:
     q[:, 2] = 0.4
     found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 26
-    words = "26 parameters are identifiable from these poses; more varied poses would identify 4 more: "
+    words = (
+        "26 parameters are identifiable from these poses; 4 more would be identifiable from more varied poses"
+    )
     assert any(words in line for line in list_warnings(found))
 
 

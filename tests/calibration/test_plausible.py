@@ -81,8 +81,8 @@ def test_values_that_are_all_multiplied_by_180_over_pi_are_identified_as_the_mis
 def test_shifted_rows_of_q_are_identified_as_the_mistake(name: str, by: int, full_poses: bool) -> None:
     said = reason(name, np.roll(arm(name).q, by, axis=0), full_poses=full_poses)
     rows = "one row" if abs(by) == 1 else "2 rows"
-    way = "later" if by > 0 else "earlier"
-    words = f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
+    row = f"i {'+' if by > 0 else '-'} {abs(by)}"
+    words = f"q is shifted by {rows} relative to the poses; the correct q of pose i is in row {row}"
     assert said.startswith(words)
 
 

@@ -198,9 +198,9 @@ def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
     assert velocity.data["v"] == motion["v"].tolist()
     assert "rates" not in velocity.err
     done = run("acceleration", *words)
-    assert "derivatives v as given, and a by central differences of this v" in done.text.splitlines()[0]
+    assert "derivatives v as given, a by central differences of v" in done.text.splitlines()[0]
     assert "largest errors about" in done.err
-    assert "estimated by a second computation with every second sample" in done.err
+    assert "estimated by comparison with the results of every second sample" in done.err
     exact = run("acceleration", *words, "--format", "json").data
     np.testing.assert_array_equal(exact["a"], np.gradient(motion["v"], motion["t"], axis=0, edge_order=2))
 
@@ -233,7 +233,7 @@ def test_a_joint_value_together_with_a_trajectory_is_refused(option: str, log: P
 
 #: Pattern in the file, its replacement, and the message
 SPOILT = {
-    "header": (r"^.*\n", "", "log.csv:1: no header: the first line must name the columns"),
+    "header": (r"^.*\n", "", "log.csv:1: the header is missing: the first line must name the columns"),
     "missing": ("panda_joint3,", "x3,", "missing: panda_joint3"),
     "unknown": ("panda_joint3,", "x3,", "unknown: x3"),
     "duplicate": ("panda_joint3,", "panda_joint2_deg,", "duplicate: panda_joint2, panda_j"),

@@ -195,7 +195,7 @@ def test_equal_robots_with_different_independent_joints_have_a_remark() -> None:
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME
     assert [one.words for one in found.remarks] == [
-        "joint wrist is a mimic joint only in A, and moves alike in A and B: 2.0 hinge +0"
+        "joint wrist is a mimic joint in A and an independent joint in B, with the same motion: 2.0 hinge +0"
     ]
     assert found.exit_code(strict=True) == 1
     assert found.to_b([0.7]).tolist() == [1.4]
@@ -241,7 +241,11 @@ def forge_frame(document: Any) -> None:
 
 
 FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
-    "another pose of a floating joint": ("one_millimetre", forge_lower, "do not correspond"),
+    "another pose of a floating joint": (
+        "one_millimetre",
+        forge_lower,
+        "are not corresponding configurations",
+    ),
     "a lower bound above the upper bound": ("one_millimetre", forge_order, "larger than the upper bound"),
     "another engine": ("one_millimetre", lambda d: d["checked"].update(by="NASA 1.0"), "`checked`"),
     "a nearer frame": ("reversed_axis", forge_frame, "has a larger distance"),

@@ -261,12 +261,11 @@ def confirmed(**changed: Any) -> dict[str, Any]:
     return done | changed
 
 
-COMPUTED = "differs from the one computed from the models"
 FORGED: dict[str, Any] = {
     "its upper bound is wrong": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
     "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
-    "of A and B do not correspond": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
-    "or exceed the limits": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
+    "are not corresponding configurations": lambda d: d["frames"][-1]["q_b"].__setitem__(0, 0.123),
+    "or a value exceeds a limit": lambda d: [d["frames"][-1][q].__setitem__(1, 50.0) for q in ("q_a", "q_b")],
     "`verdict`: the models give differs": lambda d: d.update(verdict="same"),
     "`differences`: this difference is missing": lambda d: d.update(differences=[]),
     "`differences`: this is not a difference": lambda d: d["differences"].append(
@@ -274,14 +273,14 @@ FORGED: dict[str, Any] = {
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
     "rad at `q_a`, `q_b`, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
-    f"`remarks`: the entry {COMPUTED}": lambda d: d["remarks"].append(d["differences"][0]),
-    f"`up_to`: the entry {COMPUTED}": lambda d: d["up_to"].append("senses"),
-    "`tools`: the entries differ from those computed from the models": lambda d: d["tools"].append(
+    "`remarks`: the models give a different entry": lambda d: d["remarks"].append(d["differences"][0]),
+    "`up_to`: the models give a different entry": lambda d: d["up_to"].append("senses"),
+    "`tools`: the models give different entries": lambda d: d["tools"].append(
         {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}),
-    f"`links`: the entry {COMPUTED}": lambda d: d["links"].pop(),
-    f"`joints`: the entry {COMPUTED}": lambda d: d["joints"].pop(),
-    f"`rounding`: the entry {COMPUTED}": lambda d: d["rounding"].update(metres=1.0),
-    f"`base_links`: the entry {COMPUTED}": lambda d: d.update(base_links=["tool"] * 2),
+    "`links`: the models give a different entry": lambda d: d["links"].pop(),
+    "`joints`: the models give a different entry": lambda d: d["joints"].pop(),
+    "`rounding`: the models give a different entry": lambda d: d["rounding"].update(metres=1.0),
+    "`base_links`: the models give a different entry": lambda d: d.update(base_links=["tool"] * 2),
     "`base`: the matrix is not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
     "`differences`: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
@@ -291,12 +290,12 @@ FORGED: dict[str, Any] = {
     "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
     "must contain a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
     "must contain a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
-    "or a reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
-    "or a reason why": lambda d: d.update(
+    "or the reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
+    "or the reason why": lambda d: d.update(
         checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)),
-    "or a reason why there is none": lambda d: d.update(checked=confirmed(by="")),
+    "or the reason why Pinocchio confirmed no bounds": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
-    "`orders`: the joints joint_2, joint_1": lambda d: d["orders"].append(["joint_2", "joint_1"]),
+    "the order joint_2, joint_1 is not possible": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }  # fmt: skip
 
 

@@ -156,14 +156,14 @@ def test_missing_accelerations_are_differences_of_the_given_velocities(
     found = read(columns_of(direct, "v"))
     np.testing.assert_array_equal(found.v, direct.v)
     np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
-    assert found.rates_source == "v as given, and a by central differences of this v"
+    assert found.rates_source == "v as given, a by central differences of v"
     with pytest.raises(InputError, match="joint accelerations need joint velocities"):
         read(columns_of(direct, "a"))
 
 
 def test_times_too_large_for_the_time_steps_are_reported(direct: Trajectory, read: Read) -> None:
     (note,) = read(columns_of(direct) | {"t": 1.7e9 + direct.t}).notes
-    assert "subtract the first time in the file" in note
+    assert "subtract the first time from all times" in note
 
 
 #: Headings of a column, by the value of 30 in SI units. The name of the joint `wheel_deg` ends like a unit.

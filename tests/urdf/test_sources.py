@@ -183,7 +183,7 @@ def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_
     assert texts['xyz="1 2 3"'] == texts['quat_xyzw="0 0 1 0"']
     (finding,), reading = texts['quat_xyzw="0 0 1 0"']
     assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw, so the rotation of joint j " in finding
-    assert "not from the file; yourdfpy ignores quat_xyzw" in reading
+    assert "instead of the file; yourdfpy ignores the attribute quat_xyzw" in reading
 
 
 def test_a_yourdfpy_robot_that_is_not_connected_is_refused() -> None:

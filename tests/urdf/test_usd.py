@@ -1410,7 +1410,7 @@ def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_roun
         assert found.verdict is Verdict.DIFFERS
         assert {one.what for one in found.differences} >= {"carried by"}
         assert [str(one) for one in found.unexplained] == [
-            "joint second: carries no link that both models have"
+            "joint second: no link after this joint has a matching link in the other model"
         ]
 
 

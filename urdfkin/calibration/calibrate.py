@@ -532,7 +532,7 @@ def _verify_written(calibration: Calibration, measurements: Measurements, q: Arr
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
-            found=f"a difference of {error.max():.3g} m or rad, but rounding explains only {bound:.3g}",
+            found=f"a difference of {error.max():.3g} m or rad; the rounding error is at most {bound:.3g} m",
             remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
     return calibration.updated_urdf.new_robot.certificate()
@@ -551,15 +551,15 @@ def _warnings(calibration: Calibration) -> Iterator[str]:
     if lost > 0:
         others = [k for k in general.free_parameters if k not in identification.free_parameters]
         yield (
-            f"{identification.rank} parameters are identifiable from these poses; more varied poses "
-            f"would identify {lost} more: {join_names((name[k] for k in others), _MAX_NAMES)}"
+            f"{identification.rank} parameters are identifiable from these poses; {lost} more would be "
+            f"identifiable from more varied poses: {join_names((name[k] for k in others), _MAX_NAMES)}"
         )
     if calibration.poorly_observable:
         worst = sorted(calibration.poorly_observable.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
             + join_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _MAX_NAMES)
-            + "; the usual uncertainty is the uncertainty at the same number of random configurations"
+            + "; the usual uncertainty is computed for the same number of random configurations"
         )
     if not fitted.has_redundancy:
         yield "the fit cannot be checked, because there are as many parameters as measured numbers"

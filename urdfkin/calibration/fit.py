@@ -34,11 +34,11 @@ variance of the positions is the sum of the squared position residuals, divided 
 redundancies 1 - H_ii. The variance of the rotations is computed in the same way. The
 estimation is repeated until the estimates are constant (Foerstner's variance components).
 
-A pose is an **outlier** if the statistic r_i^T (1 - H_ii)^-1 r_i is too large. For any other pose, this
-statistic has a chi^2 distribution. The distribution has 3 degrees of freedom for a position, and 6 for a full
-pose. The probability that a data set without outliers exceeds the limit is about 1 %. One outlier can hide
-another, so each step removes only the largest outlier and fits the other poses again. The steps end when no
-outlier is left.
+A pose is an **outlier** if the statistic r_i^T (1 - H_ii)^-1 r_i is too large. If a pose is not an outlier,
+its statistic has a chi^2 distribution. The distribution has 3 degrees of freedom for a position, and 6 for a
+full pose. The probability that a data set without outliers exceeds the limit is about 1 %. One outlier can
+hide another, so each step removes only the largest outlier and fits the other poses again. The steps end when
+no outlier is left.
 
 **Start values.** Before the fit, start values of base and tool are computed from the measured poses. The
 robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i

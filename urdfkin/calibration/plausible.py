@@ -50,11 +50,12 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Two configurations count as equal if their joint values, rounded to multiples of this number, are equal.
 #: The unit is rad or m.
 _ONE_CONFIGURATION = 1e-6
-#: A parameter's change is reduced by this number of its standard deviations, and then compared with a limit.
+#: Number of standard deviations that are subtracted from a parameter's change.
+#: The remainder is compared with a limit.
 #: For this reason, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _UNCERTAIN = 5.0
-#: A correction of the data is accepted only if it multiplies the fit's error by at most this factor.
+#: An accepted correction of the data multiplies the fit's error by at most this factor.
 #: The factor is `_NOT_WORSE` for a fit that is not plausible or changes a joint's zero by half a turn.
 #: The factor is `_BETTER` for any other fit.
 _BETTER, _NOT_WORSE = 0.25, 1.5
@@ -211,7 +212,7 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     if better is None:
         return Plausibility(tuple(objections), is_in_degrees=in_degrees)
     if not objections:
-        half = f"a joint zero changed by half a turn, joint {_join_names(zeros)}; " if zeros else ""
+        half = f"the zero position changed by half a turn: joint {_join_names(zeros)}; " if zeros else ""
         objections = [
             f"{half}an rms error of {fit.full_fit.rms_text}, but only {better.fit.full_fit.rms_text} with a"
             " correction of the data"
@@ -280,10 +281,10 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
     for by in _SHIFTS:
         if len(q) > abs(by) + 1:
             rows = "one row" if abs(by) == 1 else f"{abs(by)} rows"
-            direction = "later" if by > 0 else "earlier"
+            sign = "+" if by > 0 else "-"
             reason = (
-                f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows}"
-                f" {direction}"
+                f"q is shifted by {rows} relative to the poses; the correct q of pose i is in row i {sign}"
+                f" {abs(by)}"
             )
             shifted = q[by:] if by > 0 else q[:by]
             yield _Correction(reason, shifted, max(-by, 0), len(q) - max(by, 0))
@@ -294,9 +295,9 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
 def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _Correction:
     names = [name for name, sign in zip(model.coupling.names, signs, strict=True) if sign < 0.0]
     joints = _join_names(map(repr, names))
-    reason = f"the signs of joints {joints} are wrong; negate their values or their axes"
+    reason = f"the signs of joints {joints} are wrong; negate the joint values or the joint axes"
     if len(names) == 1:
-        reason = f"the sign of joint {joints} is wrong; negate its values or its axis"
+        reason = f"the sign of joint {joints} is wrong; negate the joint values or the joint axis"
     return _Correction(reason, q * signs)
 
 

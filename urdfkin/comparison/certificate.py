@@ -68,8 +68,8 @@ class DifferenceEntry(TypedDict):
     ]
     a: Annotated[Value, doc("Value of the parameter in A; null if A has none.")]
     b: Annotated[Value, doc("Value of the parameter in B; null if B has none.")]
-    radians: Annotated[Size, doc("Angular part of the difference, radians; 0 if there is none.")]
-    metres: Annotated[Size, doc("Linear part of the difference, metres; 0 if there is none.")]
+    radians: Annotated[Size, doc("Angular part of the difference, radians; 0 without an angular part.")]
+    metres: Annotated[Size, doc("Linear part of the difference, metres; 0 without a linear part.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
         doc("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
@@ -83,7 +83,10 @@ class CertifiedConversion(TypedDict):
     behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
         bool,
-        doc("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
+        doc(
+            "Whether the formula contains the inverse of the pose in A. The inverse is needed if the joint's"
+            " parent in A is the joint's child in B."
+        ),
     ]
 
 
@@ -96,7 +99,7 @@ class CertifiedJoint(TypedDict):
     offset: Annotated[float, doc("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        doc("Conversion of a planar or floating joint's pose; null if not needed."),
+        doc("Conversion of a planar or floating joint's pose from A to B; null if no conversion is needed."),
     ]
 
 
@@ -126,8 +129,8 @@ class FrameEntry(TypedDict):
     lower: Annotated[
         Size,
         doc(
-            "Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding"
-            " error."
+            "Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`, minus"
+            " the largest rounding error."
         ),
     ]
     upper: Annotated[
@@ -177,7 +180,10 @@ class SameCertificate(Header):
     links: Annotated[list[Annotated[list[str], of_length(2)]], doc("Pairs of a link of A and a link of B.")]
     tools: Annotated[
         list[ToolEntry],
-        doc("Matched links whose poses differ; each counts as a different tool."),
+        doc(
+            "Pairs of matched links with different poses on the same rigid body. `same` reports the links of"
+            " a pair as different tools."
+        ),
     ]
     orders: Annotated[
         list[list[str]], doc("Consecutive joints of B whose order was changed, in the new order.")
@@ -193,7 +199,10 @@ class SameCertificate(Header):
     ]
     as_written: Annotated[
         FrameEntry | None,
-        doc("Interval for the frame with the largest distance before B is changed; null without changes."),
+        doc(
+            "Interval for the frame with the largest distance between the unchanged models; null if B needs"
+            " no changes."
+        ),
     ]
     checked: Confirmed
 
@@ -319,11 +328,11 @@ def _statement_errors(document: SameCertificate, comparator: Comparator, result:
         if key in expected and not _same_difference(one, expected[key], result.rounding):
             yield f"`differences`: the size or a value is wrong in: {difference_text(one)}"
     if not _equal(document["tools"], correct["tools"], max(result.rounding)):
-        yield "`tools`: the entries differ from those computed from the models"
+        yield "`tools`: the models give different entries"
     if document["verdict"] != result.verdict.value:
         yield f"`verdict`: the models give {result.verdict.value}, not {document['verdict']}"
     yield from (
-        f"`{name}`: the entry differs from the one computed from the models"
+        f"`{name}`: the models give a different entry"
         for name in DERIVED
         if not _equal(dict(document)[name], dict(correct)[name])
     )
@@ -353,7 +362,7 @@ def _confirmation_errors(
     if state != "confirmed" or reason or claimed["configurations"] != CONFIRMATION_SAMPLES or not known:
         yield (
             f"`checked`: the entry must contain a confirmation at {CONFIRMATION_SAMPLES} configurations,"
-            " or a reason why there is none"
+            " or the reason why Pinocchio confirmed no bounds"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
@@ -397,7 +406,8 @@ def _choices_error(
         if not b.allows_order(names, comparator.tolerance):
             order = ", ".join(names)
             return (
-                f"`orders`: the joints {order} are not consecutive, or this order changes the robot's motion"
+                f"`orders`: the order {order} is not possible: the joints are not consecutive, or the order"
+                " changes the robot's motion"
             )
         b = b.reorder(names)
     return None
@@ -487,7 +497,10 @@ def _interval_errors(
             proven = tighten(search, frame, metres, proven[0], MAX_RECHECK_BOXES), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
-    yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"
+    yield (
+        f"{place}: its upper bound is not proven; the proven bounds are {proven[0]:.6g} m and"
+        f" {proven[1]:.6g} rad"
+    )
 
 
 def _lower_bound_errors(
@@ -496,7 +509,7 @@ def _lower_bound_errors(
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):
-        yield f"{place}: the configurations of A and B do not correspond, or exceed the limits"
+        yield f"{place}: `q_a` and `q_b` are not corresponding configurations, or a value exceeds a limit"
         return
     for computed, by in ((own_poses, "urdfkin"), (pinocchio_poses, "Pinocchio")):
         poses = search.poses_at(q_a, q_b, [frame], computed)

@@ -122,7 +122,7 @@ class Difference:
         b: The parameter's value in B. None if the parameter has no value.
         radians: Angular part of the difference, radians; 0 if the difference has no angular part.
         metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: More about the difference. "alone": the joint's axis differs, but the links after the joint
+        detail: Details of the difference. "alone": the joint's axis differs, but the links after the joint
             agree. "converted": the limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
@@ -168,7 +168,10 @@ class Difference:
             case "mimic rule":
                 return f"{place} has different mimic rules: {_format_rule(a)} in A, {_format_rule(b)} in B"
             case "independent joint":
-                return f"{place} is a mimic joint only in A, and moves alike in A and B: {_format_rule(a)}"
+                return (
+                    f"{place} is a mimic joint in A and an independent joint in B, with the same motion:"
+                    f" {_format_rule(a)}"
+                )
             case "idle":
                 which, values = ("A", a) if isinstance(a, tuple) else ("B", b)
                 return f"{place} never moves in {which}: {_idle_words(values)}"
@@ -567,7 +570,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with `Sameness.to_b`; a convention cannot convert between joint frames",
+                    remedy="convert q with `Sameness.to_b`, because a convention cannot change joint frames",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)

@@ -318,7 +318,7 @@ class Comparator:
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="also map the joints that carry these two joints, or remove this pair",
+                    remedy="also map the parent joints of these two joints, or remove this pair of joints",
                 )
 
     def search(
@@ -656,11 +656,11 @@ class JointComparison:
     the bounds of both models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
-    joint's parent may be a link that only B has. As another example, B may have other joints between P and
-    the joint. Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is
-    rounded, two conditions must hold. The path from P to the link has at most one moving joint. In the second
-    model, the joints between the common ancestor and P have no rounded numbers. If a condition does not hold,
-    `same` reports the difference as not explained.
+    joint's parent may be a link that only B has. B may also have additional joints between P and the joint.
+    Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is rounded, two
+    conditions must hold. The path from P to the link has at most one moving joint. In the second model, the
+    joints between the common ancestor and P have no rounded numbers. If a condition does not hold, `same`
+    reports the difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
@@ -707,7 +707,7 @@ class JointComparison:
         for step in self.alignment.steps:
             yield from self._rule_differences(step)
             if step.a not in compared:
-                why = "carries no link that both models have"
+                why = "no link after this joint has a matching link in the other model"
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:

@@ -1104,9 +1104,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. In a checked
-                call, the smallest accepted distance is at least the rounding error of the rotation (about
-                1e-13 rad). A quaternion has no singularity.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. If Pinocchio
+                checks the call, the smallest accepted distance is at least the rounding error of the rotation
+                (about 1e-13 rad). A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin

@@ -165,7 +165,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         )
         if lost:
             robot.verifier.source_notes = (
-                "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
+                "from a yourdfpy object instead of the file; yourdfpy ignores the attribute quat_xyzw"
             )
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)

@@ -181,7 +181,7 @@ class Trajectory:
         v, a = self.errors
         return (
             f"{self.rates_source}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or"
-            " m/s^2 (a), estimated by a second computation with every second sample"
+            " m/s^2 (a), estimated by comparison with the results of every second sample"
         )
 
 
@@ -233,9 +233,9 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file contains no joint accelerations, they are
-    computed by central differences. If the file contains no joint velocities either, both are computed by
-    central differences. Before v is computed, the angles of continuous, planar and floating joints are
+    Without t, the samples are one second apart. Joint accelerations that the file lacks are computed by
+    central differences. If the file lacks joint velocities too, urdfkin computes velocities and accelerations
+    by central differences. Before v is computed, the angles of continuous, planar and floating joints are
     unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report these computations.
 
     Args:
@@ -309,7 +309,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
         # With the time step h, the error of a is proportional to h^order.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
-    words = "by central differences" if x.v is None else "v as given, and a by central differences of this v"
+    words = "by central differences" if x.v is None else "v as given, a by central differences of v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
     notes = (*found.notes, *_time_notes(t, has_times=x.t is not None))
@@ -340,7 +340,7 @@ def _time_notes(t: FloatArray, *, has_times: bool) -> Iterator[str]:
     if rounding > _TIME_ROUNDING * step:
         yield (
             f"times near {t[-1]:.0f} s are rounded to {rounding:.1g} s, and the smallest step is"
-            f" {step:.1g} s: subtract the first time in the file"
+            f" {step:.1g} s; subtract the first time from all times"
         )
 
 
@@ -386,7 +386,7 @@ def _read_npz(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 def _central_velocities(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
     """Return joint velocities (n, nv), computed by central differences.
 
-    The velocity of a planar or floating joint is in the axes of the moving frame.
+    The velocity of a planar or floating joint is expressed in the axes of the moving frame.
     """
     slopes = _differentiate(q, t)
     v = np.empty((len(q), tree.nv))
@@ -453,7 +453,7 @@ def read_columns(
             and all(parse_float(x) is not None for x in cells)
         ):
             raise InputError(
-                f"no header: the first line must name the columns of {what}",
+                f"the header is missing: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
                 found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
                 remedy=f"add a first line with the column names: {join_names([*optional[:1], *required])}",
@@ -679,7 +679,7 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
     return (
         f"joint {joint.name}: its {what} after sample {k[0]}{more};"
-        " this change is not a motion of the robot, so urdfkin removed the change"
+        " urdfkin removed this change, because the change is not a motion of the robot"
     )
 
 
