@@ -260,7 +260,7 @@ def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
 def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.mimicked_joint}: give that joint's value,"
+            f"this joint mimics {joint.mimic.mimicked_joint}: give the value of {joint.mimic.mimicked_joint},"
             " or load with mimic=False (--no-mimic)",
             QuestionsSection.MIMIC_JOINTS,
         )
