@@ -92,7 +92,7 @@ MISTAKES = {
     "info panda --lock elbow=1": "unknown coordinate 'elbow'",
     "info panda --lock panda_joint1=200deg": "3.49066 is outside [-2.8973, 2.8973]",
     "info panda --lock panda_joint1=90": "degrees? write 90deg",
-    "info panda --lock panda_finger_joint2=0.01": "it mimics panda_finger_joint1",
+    "info panda --lock panda_finger_joint2=0.01": "this joint mimics panda_finger_joint1",
     "info panda --lock 0.4": "give each number with its name",
     "info panda --joints elbow": "unknown coordinate 'elbow'",
     "info panda --joints panda_joint1": "--lock panda_joint4=VALUE",

@@ -322,7 +322,10 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
     ("options", "words"),
     [
         ({"lock": {"elbow": 1.0}}, "unknown coordinate 'elbow'"),
-        ({"lock": {"panda_finger_joint2": 0.01}}, "it mimics panda_finger_joint1: give that joint's value"),
+        (
+            {"lock": {"panda_finger_joint2": 0.01}},
+            "this joint mimics panda_finger_joint1: give the value of panda_finger_joint1",
+        ),
         ({"lock": {"panda_joint8": 0.0}}, "leave out this fixed joint"),
         ({"lock": {"panda_finger_joint1": 4.0}}, "4 is outside [0, 0.04]"),
         ({"lock": {"panda_joint1": 90}}, "degrees? write 90deg"),
@@ -337,7 +340,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
         ({"joints": "panda_joint1"}, "must be a list of names"),
         ({"joints": ["panda_joint1"]}, "give a value within them: lock={'panda_joint4': VALUE}"),
         ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also in the list joints"),
-        ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
+        ({"joints": ["panda_finger_joint2"]}, "this joint mimics panda_finger_joint1"),
     ],
 )
 def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) -> None:

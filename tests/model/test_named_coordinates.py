@@ -64,7 +64,7 @@ def test_each_notation_gives_the_same_bits(text: Any, arm: Robot) -> None:
         ("0,0,0,0", "load with mimic=False"),
         ("shoulder=1,lift=0", "q: no value for elbow; give a value for each joint, or begin with"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1", "'echo' is not a coordinate; it mimics elbow: give that joint's value"),
+        ("echo=1,elbow=1", "'echo' is not a coordinate; this joint mimics elbow: give the value of elbow"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),

@@ -114,7 +114,7 @@ def csv_cell(name: str) -> str:
 
 
 def csv_value(text: str) -> str:
-    """Escape text for a CSV cell as `csv_cell` does, unless it is a number.
+    """Escape text for a CSV cell as `csv_cell` does; return a number unchanged.
 
     >>> csv_value("-0.5"), csv_value("-y")
     ('-0.5', "'-y")

@@ -21,7 +21,7 @@ length is not 1 also raises InputError.
 A user's matrix often has only a few digits. A conversion to a quaternion, a conversion to Euler angles, and
 Gram-Schmidt then give different rotations. `nearest_rotation` and `polar_factor` return the rotation that is
 nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors; `polar_factor` accepts
-errors of any size. The nearest rotation is unique: it is the orthogonal factor U of the polar decomposition
+errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar decomposition
 M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
@@ -204,7 +204,7 @@ def rotation_from_quaternion(quat: ArrayLike) -> FloatArray:
 def quaternion_of(R: ArrayLike) -> FloatArray:
     """Return the unit quaternion of a rotation, with qw >= 0.
 
-    Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
+    Shepperd's method divides by the component with the largest absolute value, which avoids cancellation.
     """
     R = as_rotations(R, "R")
     # Each row of the matrix K = 4 q q^T is a multiple of the quaternion q.

@@ -17,12 +17,12 @@ first rotation is the joint's constant rotation. The second rotation is the join
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The last row is computed for the whole joint; it is not the sum of the first three rows. urdfkin's last count
+The last row is computed for the whole joint, and is not the sum of the first three rows. urdfkin's last count
 is smaller than the sum, because the worst cases of the three rows do not occur together. Pinocchio's last
 count is larger than the sum, because a rotation adds the errors of several components. The errors of urdfkin
 and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
-`tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers that
-record each of their roundings.
+`tests/kinematics/test_roundings.py` computes the counts of the table. The test runs the equations on numbers
+that record each rounding.
 
 For example, the acceleration of a frame is a sum of terms such as w x (w x d). This term has the three
 factors w, w and d. The addition of the terms and the cross products in a term have rounding errors too. In

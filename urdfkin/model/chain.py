@@ -292,7 +292,7 @@ def _check_single_axis(tree: KinematicTree, joint: Joint, base: str, tip: str) -
     raise InputError(
         f"a {joint.kind.value} joint has no single axis and cannot be on a path of axes",
         where=f"joint {joint.name}",
-        found=f"it lies between {base} and {tip}",
+        found=f"this joint lies between {base} and {tip}",
         remedy=f"choose base and tip on the same side of this joint: both from {child!r} outwards, or"
-        " both before it",
+        " both before this joint",
     )

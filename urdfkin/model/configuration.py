@@ -8,7 +8,7 @@
 | floating | x, y, z, qx, qy, qz, qw | the same |
 | mimic | none | a coordinate of its own, in the default model |
 
-The range of a coordinate follows from the limits of its joint and of the joints that mimic it.
+The limits of a joint and of its mimic joints determine the range of the joint's coordinate.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate, without the limits of its mimic joints."""
+    """Return the range of each joint with one coordinate; ignore the limits of mimic joints."""
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
@@ -260,7 +260,7 @@ def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
 def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.mimicked_joint}: give that joint's value,"
+            f"this joint mimics {joint.mimic.mimicked_joint}: give the value of {joint.mimic.mimicked_joint},"
             " or load with mimic=False (--no-mimic)",
             QuestionsSection.MIMIC_JOINTS,
         )

@@ -61,7 +61,8 @@ class Coupling:
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
-                f"it mimics {mimic.mimicked_joint}: give that joint's value", QuestionsSection.MIMIC_JOINTS
+                f"this joint mimics {mimic.mimicked_joint}: give the value of {mimic.mimicked_joint}",
+                QuestionsSection.MIMIC_JOINTS,
             )
             for joint, mimic, _ in rules
             if mimic

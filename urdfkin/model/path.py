@@ -62,7 +62,7 @@ class Path:
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
         """Yield the poses (..., 4, 4) after each step; the yielded arrays may share memory."""
-        # A motion by 0 is skipped, because it changes nothing.
+        # A motion by 0 changes nothing and is skipped.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0

@@ -60,7 +60,7 @@ class JointFrame(FrameName):
 
 
 def freeze(array: ArrayLike) -> FloatArray:
-    """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
+    """Return a read-only, C-contiguous float64 copy of `array`; raise InputError for non-numeric data."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
     copy = np.array(array if numeric else inputs.as_floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
@@ -105,7 +105,8 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
+#: A joint value is far outside the limits if the value exceeds a limit by more than `_FAR_DISTANCE`.
+#: The unit of `_FAR_DISTANCE` is rad or m.
 #: The value must also exceed this limit by more than `_FAR_FRACTION` times the joint's range.
 #: If a limit is missing, each value that exceeds the other limit is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25

@@ -159,7 +159,7 @@ def parse_convention(text: str, where: str, name: str) -> Convention:
     try:
         entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError("this is not a TOML file", where=where, found=str(error)) from None
+        raise InputError("the convention is not a TOML file", where=where, found=str(error)) from None
     like = entries.pop("like", "urdf")
     if like not in _load_built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)

@@ -2,8 +2,8 @@
 
 Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
 and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
-first. M is constant unless the target program and urdfkin use different axes for the velocity of a floating
-or planar joint.
+first. If the target program and urdfkin use different axes for the velocity of a floating or planar joint, M
+depends on q. In all other cases, M is constant.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             joints, links = list[int](), [link]
-            # The loop also visits the links that it appends to the list.
+            # The loop appends links to the list and visits these links later.
             for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
@@ -627,8 +627,8 @@ class Conversion:
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
-        The rows must have the same meaning in both conventions, such as derivatives of Euler angles. If
-        several columns of the target program belong to one column of J, InputError is raised.
+        The rows must have the same meaning in both conventions, such as derivatives of Euler angles.
+        InputError is raised if several columns of the target program belong to one column of J.
         """
         self._check_columns()
         array = np.asarray(J, dtype=np.float64)

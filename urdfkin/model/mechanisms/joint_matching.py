@@ -4,11 +4,12 @@ Joints at two matched bodies are paired by the names that the user gives or by e
 joints are paired by equal labels of the links after the joints, or by geometry.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
-the mimic rules must correspond, unless `SubtreeMatcher.ignore_rules` was called. The value of the joint
-before a subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the
-result depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the
-other. `SubtreeMatcher` stores the result of each such case, so that the search is fast even for long chains.
+the other subtree. Links with equal labels must coincide too. By default, a link's label is the link's name.
+The multipliers of the mimic rules must correspond. The method `SubtreeMatcher.ignore_rules` removes this last
+condition. The value of the joint before a subtree does not matter, because the joint's zero offset can
+compensate any value. Therefore, the result depends only on the two joints before the subtrees, and on the
+pose of one joint's axis relative to the other. `SubtreeMatcher` stores the result of each such case, so that
+the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -575,7 +576,7 @@ class SubtreeMatcher:
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
         """Return whether a motion of the joint leads from the pose X to the pose `other`.
 
-        For a planar joint, the result is true only if the two poses are equal.
+        For a planar joint, the function only checks whether the two poses are equal.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

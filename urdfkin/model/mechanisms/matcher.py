@@ -692,7 +692,7 @@ def _orders_to_try(
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
-    """Use the zero offsets that fit the mimic rules, unless the alignment becomes worse."""
+    """Return an alignment with zero offsets that fit the mimic rules, or `best` if the new one is worse."""
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -772,7 +772,8 @@ def _best_alignment(
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
 FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
-#: The factor is large, because two axes close to each other determine a zero offset inexactly.
+#: Two axes close to each other determine a zero offset inexactly.
+#: Therefore, the factor is large.
 OFFSET_FACTOR = 1e4
 
 

@@ -20,10 +20,10 @@ over, N must also turn the plane over.
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
 the value t moves the bodies after it by exp(S t). The matched joint of B moves the corresponding bodies by
-exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If G also moves
-A's joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and
-all later bodies of B are displaced together, G changes at the joint by a constant rigid motion L. If only the
-axis is displaced, S' differs from S. The link poses of A and B are then
+exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If G moves A's
+joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and all later
+bodies of B are displaced together, G changes at the joint by a constant rigid motion L. If only the axis is
+displaced, S' differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
@@ -122,7 +122,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 _POSE_TOLERANCE = 1e-9
-#: Test coordinates (m, m, rad) of a planar joint; none of them is 0.
+#: Test coordinates (m, m, rad) of a planar joint; each coordinate differs from 0.
 _TEST_COORDINATES = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -193,9 +193,9 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
-    M must keep or reverse the plane's normal. M then consists of a translation along the normal and a motion
-    in the plane. If M reverses the normal, M also contains half a turn about x. N contains the opposite
-    translation and the same half turn.
+    M must keep or reverse the plane's normal. Such a motion M consists of a translation along the normal and
+    a motion in the plane. If M reverses the normal, M contains half a turn about x in addition. N contains
+    the opposite translation. If M contains half a turn, N contains the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -571,8 +571,8 @@ class Alignment:
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `name_map`. For each of the two pairs, A and B differ
-        at this pair, or at a joint or link after this pair.
+        The names of a and c occur neither in B nor in `name_map`. A and B differ at each of the two pairs, or
+        at a joint or link after the pair.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -800,8 +800,8 @@ class _VariablesBuilder:
         """Return the range of each variable.
 
         The range is the intersection of the limits of the joints that the variable moves. If this
-        intersection is empty or a single value, the range consists of A's limits. The limits of a mimic joint
-        do not count, because a mimic joint follows its rule even beyond its limits.
+        intersection is empty or a single value, the range consists of A's limits. The limits of mimic joints
+        are ignored, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -314,7 +314,7 @@ def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Apply the motions of the next joint to the support functions of d and y (module docstring)."""
-    # A planar or floating joint has no limits, so it may rotate d into any direction.
+    # A planar or floating joint has no limits, so the joint may rotate d into any direction.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.lengths)
@@ -378,8 +378,8 @@ def _prismatic_difference(
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
     """Return sample values (n,) of the variable that moves a revolute joint of A and the matched joint of B.
 
-    The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
-    needed. The result is also None if the variable has no limits and a slope is not 0, 1 or -1.
+    The result is None in three cases: different variables move the two joints, more than `MOST_VALUES`
+    samples are needed, or a variable without limits has a slope other than 0, 1 and -1.
     """
     if (name := pair.variable) is None:
         return None
