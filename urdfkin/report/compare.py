@@ -188,8 +188,7 @@ GROWTH_FACTOR = 2.0
 #: The number is in multiples of eps * scale.
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
-#: This number limits the ratio of a disagreement to its bound.
-#: If the ratio is at most this number after the growth, the growth is not a regression.
+#: The ratio of a disagreement to its bound can grow to this number without a regression.
 _BOUND_RATIO_FLOOR = 0.1
 
 

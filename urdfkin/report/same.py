@@ -146,8 +146,8 @@ def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
     The table contains the distances after model B was changed to match model A. The verdict "same up to
-    single precision" compares the unchanged models. Therefore, if this verdict is given, the heading lists
-    the changes of model B.
+    single precision" compares the unchanged models. For this verdict, the heading therefore lists the changes
+    of model B.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -173,8 +173,8 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text contains the nonzero coordinates of model A. Some joints of model B match no independent joint of
-    model A. The text also contains the nonzero coordinates of these joints.
+    The text contains the nonzero coordinates of model A. The text also contains the nonzero coordinates of
+    those joints of model B that match no independent joint of model A.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]

@@ -169,8 +169,8 @@ class _AccuracyBatch:
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
         """Yield the analytical Jacobians of each representation of the orientation.
 
-        Poses near a singularity of Euler angles are skipped. Poses with a quaternion of uncertain sign are
-        skipped.
+        For Euler angles, poses near a singularity are skipped. For quaternions, poses are skipped if the sign
+        of the quaternion is uncertain.
         """
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part

@@ -31,9 +31,9 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    If `is_transient` is True, the chunk could not be run or the answer was lost. A transient failure is not
-    stored. Therefore, a resumed run computes the chunk again. `error` is the traceback of an unexpected
-    error.
+    If `is_transient` is True, the robot is not the cause: the chunk could not be run, or its answer was lost.
+    A transient failure is not stored, so a resumed run computes the chunk again. `error` is the traceback of
+    an unexpected error.
     """
 
     verdict: ValidationVerdict

@@ -1,4 +1,4 @@
-"""The function `validate`: split the work into chunks, run the chunks, and make the report."""
+"""The function `validate`: split the work into chunks, run the chunks on an engine, and make the report."""
 
 from __future__ import annotations
 

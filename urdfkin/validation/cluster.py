@@ -65,8 +65,8 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
     on this machine. Local workers open no port, and stop when the context ends. `tell` receives messages for
     the user.
 
-    Raise ClusterError if no scheduler answers, or if a worker cannot run urdfkin. ClusterError is also
-    raised if the versions or the code on the cluster differ from this process.
+    Raise ClusterError if no scheduler answers, if a worker cannot run urdfkin, or if the cluster and this
+    process have different versions or code.
     """
     with _client(scheduler) as client:
         _check_versions(client)

@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Each new result is added to the results of adjacent chunks immediately. Therefore, memory does not
-grow with the number of samples. The sum does not depend on the order in which the results arrive.
+Each new result is immediately added to the results of adjacent chunks, so the memory does not grow with the
+number of samples. The sum does not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: Number of finished chunks from an earlier run.
-        failures: Number of robots that have a disagreement or could not be checked.
+        failures: Number of robots so far that have a disagreement or could not be checked.
     """
 
     robots_done: int

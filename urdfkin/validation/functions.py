@@ -528,9 +528,9 @@ class _Run:
 
         If the conversion only reorders numbers, the bound is 0. Any other conversion rounds each joint angle
         before the angle is passed to the user's function. The rounded angle differs from urdfkin's angle by
-        up to 2 eps |q|. Therefore, the joint's rotation matrix has an error of up to 2 eps |q|. Each term of
-        the result is a product of rotated vectors. Each joint may rotate each of these vectors. Therefore,
-        the error of a vector is at most the sum of the errors of all rotation matrices. The matrix that
+        up to 2 eps |q|, so the joint's rotation matrix has an error of up to 2 eps |q|. Each term of the
+        result is a product of rotated vectors, and each joint may rotate each of these vectors. The error of
+        a vector is therefore at most the sum of the errors of all rotation matrices. The matrix that
         converts the velocities of a planar or floating joint adds at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row

@@ -1,9 +1,9 @@
 """Bounds on the difference between two correct computations of a quantity.
 
 Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
-the bound k * eps * scale.
+this bound:
 
-    eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
+    k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
@@ -218,9 +218,9 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array.
+    """Return the columns of an array (n or 1, ...).
 
-    For a single configuration, the columns are Python numbers.
+    For a single configuration (n = 1), the columns are Python numbers.
     """
     return x[0].tolist() if n == len(x) == 1 else x.T
 
@@ -233,7 +233,7 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: The first number of a pair is the joint's number of translations, the second number of rotations.
+#: Each pair contains the joint's number of translations and the joint's number of rotations.
 _FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -554,7 +554,7 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 
     In the linear rows, urdfkin computes one product z x (z x d), or the two products of c_1 x c_2. In LOCAL,
     urdfkin first rotates the two columns by R. Each of the two products then has the five factors R, z, R, z
-    and d, so urdfkin has 10 factors in total. The bound allows 12 factors: three products of four factors
+    and d, and the two products have 10 factors. The bound allows 12 factors: three products of four factors
     each.
     """
     shape = len(plan.frames), plan.nv, plan.nv
@@ -580,7 +580,7 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The position rows have the same bound as the rows of the velocity Jacobian. The other three rows are the
+    The position rows have the same bound as the rows of the velocity Jacobian. The other three rows give the
     derivatives of the Euler angles. Let w be the angular part of one column of the velocity Jacobian. The
     rotation axes of the three angles are e_i, u and t = R e_k (`urdfkin.verify.analytical_reference`). Let s
     = |e_i x t|, which is the sine or cosine of the middle angle:

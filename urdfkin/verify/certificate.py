@@ -101,7 +101,7 @@ class LineEntry(TypedDict):
         Size | None,
         doc(
             "Largest difference between a result and the oracle's result, in multiples of eps * scale;"
-            " null: the difference is not finite."
+            " null: this multiple is not finite."
         ),
     ]
     bound_ratio: Annotated[

@@ -262,7 +262,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
     # The rotation matrices of the table's base and tool may be rounded to six digits.
-    # The rotations in the URDF are exact, so the bound includes the errors of these matrices.
+    # The rotations in the URDF are exact, so the bound includes the rounding of the table's matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

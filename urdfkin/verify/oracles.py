@@ -82,8 +82,7 @@ def oracle_library(name: object) -> OracleLibrary:
 def version(package: str) -> str:
     """Return the version of a package.
 
-    For a package that is not installed, the result is "not installed". For urdfkin, the result is then "a
-    checkout" instead.
+    If the package is not installed, return "not installed", or "a checkout" if the package is urdfkin.
     """
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 

@@ -190,7 +190,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # For the known causes of this error, `urdfkin check` has a finding, and urdfkin builds no model.
+        # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
         # The cause of this error is therefore unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",

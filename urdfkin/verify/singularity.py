@@ -147,7 +147,8 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # If the arm has fewer joints than the Jacobian has rows, lost directions depend on q.
+        # If the arm has fewer joints than the Jacobian has rows, some directions have no motion at any q.
+        # These directions can depend on q, and the lost directions are then unknown.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:

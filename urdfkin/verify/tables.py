@@ -76,8 +76,8 @@ class TableCheck:
         bound_ratios: Ratio of the difference to its bound for "placement", "jacobian" and "acceleration". A
             ratio above 1 is a disagreement, unless `loss` explains the difference.
         has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
-        loss: Text about the longest length in the table, if very large lengths cause a difference above the
-            bound. In all other cases, `loss` is None.
+        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
+            difference. In all other cases, `loss` is None.
     """
 
     samples: int
@@ -238,7 +238,7 @@ class ErrorScales:
 
     Attributes:
         reach: (n,) sum of two path lengths, m: from the root to the table's base, and from the root to the
-            table's tip. The module docstring states how long lengths in the table increase `reach`.
+            table's tip. Large lengths in the table increase `reach`, as the module's docstring describes.
         turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
             Only joints from the root to the table's base or tip count.
         sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.

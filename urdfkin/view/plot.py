@@ -160,8 +160,9 @@ def _draw_coordinates(
 ) -> None:
     """Draw the coordinates in `indices` that change during the trajectory.
 
-    If no coordinate changes, the panel shows all coordinates in `indices`. Thin lines are the limits of the
-    coordinates in the legend.
+    If no coordinate changes, the panel shows all coordinates in `indices`. If more than
+    `_MOST_NAMES` coordinates are drawn, the coordinates within their limits are grey. Thin lines are the
+    limits of the coordinates that are not grey.
     """
     del x
     values: FloatArray = getattr(trajectory, what)

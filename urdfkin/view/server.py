@@ -66,8 +66,8 @@ def open_page(address: str) -> Iterator[None]:
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
 #: Headers of every response.
-#: The headers forbid caching, guesses of the content type, and embedding in other pages.
-#: The headers also forbid the Referer header, because the page's address contains the key.
+#: The headers forbid caching, guessing the content type, and embedding the page in other pages.
+#: The page's address contains the key, so the headers also forbid browsers to send the address as Referer.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",

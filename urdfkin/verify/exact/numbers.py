@@ -168,9 +168,9 @@ def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (1 + E) has the same orthogonal factor U as M. Therefore X^T X - 1 = 2 E + E^2. The eigenvalues of E are
-    above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of
-    each interval.
+    (1 + E) has the same orthogonal factor U as M, and E is symmetric, so X^T X - 1 = 2 E + E^2. The
+    eigenvalues of E are above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is
+    added to the radius of each interval.
     """
     with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
