@@ -287,8 +287,8 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
     input. For a FOLDER, the command checks the *.urdf files in the folder and its subfolders, except hidden
     subfolders. Without FILE and FOLDER, the current folder is checked. A .xacro file is expanded in a
-    restricted process. This process can only compute and read the files of the package that contains the
-    .xacro file (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
+    restricted process. This process can only compute and read files in certain folders, such as the .xacro
+    file's package (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
     Settings are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.

@@ -87,9 +87,8 @@ choice_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rule for the offsets along parallel joint axes. last: the cell d of the last row contains the sum of"
-        " the offsets. first: the cell d of the first row contains the sum. each: the cell d of each row"
-        " contains the offset of the row's link.",
+        "Rule for the rows of consecutive parallel axes. last or first: the cell d of the last or first of"
+        " these rows contains the sum of the offsets. each: each cell d contains the offset of its own link.",
     ),
     click.option(
         "--flip",

@@ -53,8 +53,8 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--strict",
     is_flag=True,
-    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if joint limits,"
-    " joint types or links differ.",
+    help="Exit with 1 if the models are equivalent only after changes of B. Also exit with 1 if the command"
+    " lists any other difference, for example of limits, joint types or links.",
 )
 @click.option(
     "--within",
@@ -73,12 +73,12 @@ _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown"
 @click.option(
     "--certificate",
     type=FILE,
-    help="Write the result to this file as a JSON certificate. --recheck verifies a certificate.",
+    help="Also write the result to this file as a JSON certificate. --recheck verifies a certificate.",
 )
 @click.option(
     "--write-map",
     type=FILE,
-    help="Write the names, order, signs and zero positions of B's joints to this TOML file. The option"
+    help="Also write the names, order, signs and zero positions of B's joints to this TOML file. The option"
     " --convention of other commands reads the file.",
 )
 @click.option(
@@ -119,11 +119,11 @@ def same_command(
     rounding of its numbers to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
-    1: the models are different. 2: bad input. With --strict, the exit code is 1 for models that are
-    equivalent only after changes of B. With --strict, the exit code is also 1 for models with different joint
-    limits, joint types or links. With --within, the command does not change B before the comparison. Exit 0:
-    every frame is proven to be within the given distance. 1: at least one frame is not proven to be within
-    the given distance.
+    1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
+    equivalent only after changes of B. The same applies to models with differences without effect on motion,
+    for example of limits, joint types or links. With --within, the command does not change B before the
+    comparison. Exit 0: every frame is proven to be within the given distance. 1: the proof fails for at least
+    one frame.
     """
     from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate

@@ -208,8 +208,8 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. Joints without a value"
-        " are then fixed as in this pose, not at 0.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. A fixed joint"
+        " without a value of its own is then fixed as in this pose, not at 0.",
     ),
     click.option(
         "--joints",
@@ -549,20 +549,20 @@ _BASE_OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
-        help="Pose of the root link in the world, in m and rad. The formats are x,y,z,roll,pitch,yaw and"
-        " x,y,z,qx,qy,qz,qw and @FILE.csv.",
+        help="Pose of the root link in the world, in m and rad: x,y,z,roll,pitch,yaw or x,y,z,qx,qy,qz,qw or"
+        " @FILE.csv.",
     ),
     "v": click.option(
         "--base-velocity",
         metavar="VALUES",
-        help="Velocity of the root link in the world's axes, in m/s and rad/s. The formats are"
-        " vx,vy,vz,wx,wy,wz and @FILE.csv.",
+        help="Velocity of the root link in the world's axes, in m/s and rad/s: vx,vy,vz,wx,wy,wz or"
+        " @FILE.csv.",
     ),
     "a": click.option(
         "--base-acceleration",
         metavar="VALUES",
-        help="Classical acceleration of the root link in the world's axes, in m/s^2 and rad/s^2. The formats"
-        " are ax,ay,az,alphax,alphay,alphaz and @FILE.csv.",
+        help="Classical acceleration of the root link in the world's axes, in m/s^2 and rad/s^2:"
+        " ax,ay,az,alphax,alphay,alphaz or @FILE.csv.",
     ),
 }
 

@@ -172,8 +172,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     type=FiniteNumber(),
     metavar="MM",
     help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if the"
-    " position error of the tip exceeds MM millimetres. The command also fails if the orientation error of"
-    " the tip exceeds MM milliradians.",
+    " tip's position error exceeds MM millimetres, or its orientation error exceeds MM milliradians.",
 )
 @verify_option
 @answer_command(*TEXT_FORMATS, "json")

@@ -100,10 +100,9 @@ class CompiledTree:
         q_indices: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) lengths (m) of paths. The length of a path is the sum of `Joint.length`
-            over the joints on the path, including fixed joints. The first elements belong to the moving
-            joints. The path to a moving joint begins at the previous moving joint. The last elements belong
-            to the frames, in the order of `frames`. The path to a frame begins at the frame's last moving
-            joint.
+            over the joints on the path, including fixed joints. The first elements are for the paths from
+            the previous moving joint to each moving joint. The other elements are for the paths from the last
+            moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
             output order.

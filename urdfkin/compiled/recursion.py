@@ -376,11 +376,10 @@ def _execute_transform(axes, op, state, g, c):
 def _execute_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The scratch row `v` contains the joint's velocity, and the scratch row `a` contains the joint's
-    acceleration. For a revolute joint, the scratch row `x` contains the sine of the joint angle. For other
-    joints, the scratch row `x` contains the first coordinate. For a planar joint, the scratch row `z`
-    contains the sine of the joint angle. For a revolute or prismatic joint, `z` is 1 if a mimic rule changes
-    the coordinate, else 0. The constants of the mimic rule begin at `g[c]`.
+    The scratch rows `v` and `a` contain the joint's velocity and acceleration. The scratch row `x` contains
+    the sine of the joint angle for a revolute joint, and the first coordinate for other joints. For a planar
+    joint, the scratch row `z` contains the sine of the joint angle. For a revolute or prismatic joint, `z` is
+    1 if a mimic rule changes the coordinate, else 0. The constants of the mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _joint_rate(state[2][0], s, v, g, c, z), _joint_rate(state[4][0], s, a, g, c, z)

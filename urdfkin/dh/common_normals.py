@@ -5,11 +5,11 @@ this joint's frame. `find_axis_transform` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. Both factors commute
-with the motion of the first joint. Therefore, both factors are part of the first joint's row. In the same
-way, the factors Rz(phi_next) and Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0,
-and the other six numbers are unique except for the direction of x (Denavit and Hartenberg). docs/dh.md
-explains the numbers for parallel and for nearly parallel axes.
+The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
+motion of the first joint, so they are part of the first joint's row. In the same way, the factors
+Rz(phi_next) and Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0, and the other
+six numbers are unique except for the direction of x (Denavit and Hartenberg). docs/dh.md explains the numbers
+for parallel and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes. For coinciding axes, the
 pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta from a reference
@@ -254,13 +254,13 @@ class PairWithReference:
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return the transform of each pair of axes, and theta of the pair's first row.
+    """Return the transform of each pair of axes, and theta of the row of the pair's first joint.
 
-    The free choices bring the cells close to the cells of the reference table. `phi_in` is the angle (rad)
-    about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m) along the first
-    axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH frame to the
-    joint's frame. With this offset, d of the last row equals the reference. If `tip_offset` is None, d of the
-    last row may differ from the reference.
+    The free choices are made so that the cells are close to the cells of the reference table. `phi_in` is the
+    angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m)
+    along the first axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH
+    frame to the joint's frame. With this offset, d of the last row equals the reference. If `tip_offset` is
+    None, d of the last row may differ from the reference.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -313,7 +313,7 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return phi so that row i, or the prismatic rows after row i, have the reference's theta."""
+    """Return the phi that gives row i, or the prismatic rows after row i, the reference's theta."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -342,7 +342,7 @@ def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
 
 
 def match_theta(theta: float, reference: float) -> float:
-    """Return `reference` if the two angles differ only by rounding. Otherwise, return theta."""
+    """Return `reference` if the two angles differ only by rounding. Otherwise, return `theta`."""
     return (
         reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )

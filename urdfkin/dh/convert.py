@@ -51,8 +51,8 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
-#: URDF requires limits of a prismatic joint.
-#: A prismatic joint without limits gets these limits (m, m/s and N).
+#: URDF requires limits for prismatic joints.
+#: A prismatic joint without limits therefore gets these limits (m, m/s and N).
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 

@@ -82,7 +82,8 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
     """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
     `like` is a standard table of the same joints. The result has the directions of x of `like`, and the
-    offsets of `like` along parallel axes. Of `options`, `sign` and the value "each" have no effect then.
+    offsets of `like` along parallel axes. With `like`, `options.sign` has no effect, and
+    `options.parallel_offset` has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -307,8 +308,8 @@ def _match_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Copy theta, a and alpha of the last row from `like`, and change the tool to compensate.
 
-    If d is 0 in the last row of `like`, d of the last row becomes 0 too. Suppose that neither table has a
-    tool, and that the two angles theta are nearly equal. Then only rounding errors are removed from theta.
+    If d is 0 in the last row of `like`, d of the last row becomes 0 too. If neither table has a tool and the
+    two angles theta are nearly equal, only the rounding errors of theta are removed.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)

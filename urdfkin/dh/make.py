@@ -25,8 +25,7 @@ from urdfkin.model.tree import KinematicTree
 #: If the cells of two tables differ by more than this number, the tables describe different robots.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
-#: Two angles theta are treated as equal if their difference is at most this number (rad).
-#: Two entries of rotation matrices are treated as equal if their difference is at most this number.
+#: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _ZERO_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
@@ -147,7 +146,8 @@ def make_dh_table(
         like: A published table. The result has the published table's positive joint directions and
             directions of x. The result also has the published offsets along parallel axes, and the published
             zero positions of the first and the last joint. All other numbers come from the URDF.
-            With `like`, `last`, `parallel_offset`, `flip`, `first` and `sign` must have their default values.
+            The arguments `last`, `parallel_offset`, `flip`, `first` and `sign` must then have their default
+            values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

@@ -273,9 +273,10 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """Return the convention that the headings or the text around the table name.
+    """Return the convention that the headings show, or else the convention that the text names.
 
-    Return None if no convention is named, or if both conventions are named.
+    Headings with the index i-1 show the modified convention. Without such headings, return None if the text
+    around the table names no convention, or both.
     """
     if any(column.previous for column in grid.columns):
         return "modified"

@@ -61,7 +61,7 @@ def snap_chain(
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
     """Return the chain with snapped angles, and the changes.
 
-    Each change has the index k of the changed constant pose A_k.
+    Each change is paired with the index k of the changed constant pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)

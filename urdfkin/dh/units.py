@@ -256,7 +256,7 @@ def parse_cell(original: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """A term of the sum in a cell. `operator` is "*" or "/" after this operator, otherwise ""."""
+    """A term of the sum in a cell. `operator` is "*" or "/" if this was the last token, otherwise ""."""
 
     sign: float = 1.0
     size: float | None = None

@@ -1,8 +1,8 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are the URDF's decimals as fractions. An angle and a multiple of pi/12 may have the same nearest
-double. Then the multiple replaces the angle: 1.5707963267948966 becomes pi/2. Irrational square roots, sines
-and cosines remain expressions.
+The constants are the URDF's decimals as fractions. If an angle and a multiple of pi/12 have the same nearest
+double, the multiple replaces the angle: 1.5707963267948966 becomes pi/2. Irrational square roots, sines and
+cosines remain expressions.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Make a function of the exported code, and bound the rounding errors of the function.
 
 Each function computes one quantity of one frame. The exported code assigns each expression that occurs more
-than once to a variable. Sines, cosines, square roots and quotients are assigned to variables. The numbers of
-a link's state (pose, velocity, acceleration) are assigned to variables. A long expression is split into
-several assignments. All other expressions are parts of larger expressions.
+than once to a variable. Sines, cosines, square roots, quotients and the numbers of a link's state (pose,
+velocity, acceleration) are also assigned to variables. A long expression is split into several assignments.
+All other expressions are parts of larger expressions.
 
 `single_bounds` bounds the rounding errors of a function in single precision. Each operation and each constant
 of the code has a rounding error, which `urdfkin.kinematics.roundings` derives. To first order in eps, the

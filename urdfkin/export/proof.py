@@ -158,7 +158,7 @@ def compare_with_pinocchio(
 
     Raise VerificationError if a difference exceeds the error bound.
     """
-    # A copy of the verifier counts the checks, so that the user's certificate does not count these checks.
+    # A copy of the verifier makes the checks, so that the user's certificate does not count them.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:

@@ -116,7 +116,10 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Return a function for `Dialect.first_lines`. The exported code checks the lengths of the inputs."""
+    """Return a function for `Dialect.first_lines`.
+
+    The exported code checks the length of each input of one configuration.
+    """
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -134,7 +137,10 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`. The exported code stacks numbers to make an array."""
+    """Return a function for `Dialect.result`.
+
+    The exported code stacks numbers, because arrays may be immutable.
+    """
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function

@@ -42,9 +42,9 @@ class NumberKind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path; `end` is the state of the frame.
 
-    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. If `own_axes`
-    is False, the motion is computed in the axes of the world frame. An input that is not needed consists of
-    zeros. `turns` are rotation matrices from the axes of each frame to the axes of the previous frame.
+    The motion of each link is computed in the axes of the link's frame if `own_axes` is True, and otherwise
+    in the axes of the world frame. An input that is not needed consists of zeros. `turns` are rotation
+    matrices from the axes of each frame to the axes of the previous frame.
     """
 
     def __init__(

@@ -341,8 +341,8 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    To write a part of a cache line, a processor must first read the line. To write a whole cache line, a
-    processor need not read the line. `address` is the address of `to[0]`.
+    A processor must read a cache line before it writes a part of the line, but not before it writes the whole
+    line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

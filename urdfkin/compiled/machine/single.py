@@ -1,15 +1,15 @@
 """Make compiled functions that compute a quantity for one configuration.
 
-Python calls a compiled function as a built-in function. In a call through Numba, checking the arguments would
-take as long as the recursion itself. CPython passes the addresses of the arguments to a built-in function,
-and does not check the arguments. The compiled function reads a few 8-byte words of each array object, at the
-offsets that CPython and NumPy guarantee to C code. The function holds Python's global interpreter lock for
-about a microsecond. For unsupported arguments, the function returns None.
+Python calls a compiled function like a built-in function. In a call through Numba, checking the arguments
+would take as long as the recursion itself. CPython passes the addresses of the arguments to a built-in
+function, and does not check the arguments. The compiled function reads a few 8-byte words of each array
+object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
+interpreter lock for about a microsecond. For unsupported arguments, the function returns None.
 
 The compiled function sets a flag before using scratch memory, and clears the flag afterwards. One atomic
 operation sets the flag, so the flag is safe even in a Python without a global interpreter lock. If another
-thread is using the scratch memory, the compiled function returns None. If the compiled function returns None,
-the caller computes the result in another way.
+thread is using the scratch memory, the compiled function also returns None. The caller then computes the
+result in another way.
 """
 
 from __future__ import annotations
@@ -129,9 +129,9 @@ def one_configuration(bound, arguments, count):
     The function also returns None if another thread is using the scratch memory, or if an input is nan,
     infinite or too large. `arguments` is the address of `count` arguments. The first arguments are q, or q
     and v, or q, v and a. The last argument is the output array or None. `bound` is the address of a tuple.
-    The tuple begins with the array of kernel arguments, NumPy's array type and None. The next two items of
-    the tuple are the function that creates the result array, and the shape of the result array. The last
-    items of the tuple are objects that must stay alive as long as the compiled function.
+    The tuple begins with the array of kernel arguments, NumPy's array type and None. The next two items are
+    the function that creates the result array, and the shape of the result array. The last items are objects
+    that must stay alive as long as the compiled function.
     """
     items, inputs = integers_at(bound), integers_at(arguments)
     address, ndarray, none = integers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]

@@ -41,12 +41,12 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
-#: Differing cells are also reported if the remaining tip error is at most `NEGLIGIBLE_ERROR` times the reach.
+#: Differing cells are reported only if their correction reduces the tip error to at most this fraction.
+#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
 _CORRECTED_FRACTION = 0.5
 #: This fraction applies to a table that does not agree with the URDF.
-#: A mistake is reported if the correction of the mistake reduces the tip error to at most this fraction.
-#: A mistake is also reported if the remaining tip error is within the tolerance.
+#: A mistake is reported only if its correction reduces the tip error to at most this fraction.
+#: A remaining tip error within the tolerance also suffices.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Suppose that n cells differ without a fit, and m cells differ after a fit.
@@ -135,7 +135,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach (metres). Angles times the reach are compared with lengths.
+    """Return the robot's reach (metres). Angles are multiplied by it to compare them with lengths.
 
     A table without Hayati rows may have offsets of kilometres. The path length of a URDF that was made from
     this table is then far larger than the reach.

@@ -115,8 +115,8 @@ class TableArrays:
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path from base to tip, and the angles (rad) and lengths (m) of the path's motions.
 
-        The array of angles and lengths has the shape (s, 5 n).
-        `values` (s, n) contains the joint values of s samples.
+        The array of angles and lengths has the shape (s, 5 n). `values` (s, n) contains the joint values of s
+        samples.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
@@ -242,7 +242,7 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of the cells. The changes remove the tip error.
+    """Return cell changes that remove the tip error.
 
     After these changes, as few cells as possible differ from `start`. If the free parameters can move the tip
     in the same way as a cell, the cell does not change. For example, a fitted joint offset moves the tip in

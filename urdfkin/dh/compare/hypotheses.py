@@ -2,9 +2,9 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if the robot's shape is
-closer to the URDF's shape. An interpretation ranks lower if it differs more from the file's interpretation.
-The function fits at most three interpretations.
+`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if its shape is closer
+to the URDF's shape, and lower if it differs more from the file's interpretation. The function fits at most
+three interpretations.
 """
 
 from __future__ import annotations

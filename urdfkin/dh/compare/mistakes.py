@@ -60,8 +60,8 @@ class MistakeSearch:
 
         The least fit changes the fewest parameters. The result is empty if no correction makes the fit
         smaller. A table that `agrees` after a fit may be correct, and may differ from the URDF only in its
-        frames. A correction of such a table is reported only if at most one end of the corrected table must
-        be fitted. The two ends are base and tool.
+        frames. A correction of such a table is reported only if the corrected table needs no fit, or only a
+        fit of one end (base or tool).
         """
         if self._without_fit(reference) is not None:
             return ()

@@ -22,8 +22,7 @@ Parts = list[str | Table | Matrix]
 
 #: After a correction of cells, a tip error up to this number is treated as zero.
 #: The unit is rad, or metres per metre of reach.
-#: The rounding errors of a fit are far smaller.
-#: The rounding errors of numbers in data sheets are far larger.
+#: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 NEGLIGIBLE_ERROR = 1e-9
 #: `fit_resolution` replaces a smaller tip error by this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
@@ -138,9 +137,9 @@ class TableComparison:
             within 10 m of zero. The bounds do not include rounding errors.
         unfitted_metres, unfitted_radians: Largest errors of the unfitted table's tip on the samples.
         unfitted_differences: The cells that must change so that the table agrees without a fit. The tuple is
-            empty for a table with mistakes, and for a comparison without a fit. The tuple is also empty if a
-            tip error remains after a correction of these cells. If these cells outnumber the cells in
-            `differences` by more than two, the tuple is empty.
+            empty for a table with mistakes, and for a comparison without a fit. It is also empty if a tip
+            error remains after a correction of these cells, or if they outnumber the cells in `differences`
+            by more than two.
         hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
             offsets.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
