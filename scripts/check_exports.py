@@ -209,7 +209,11 @@ def make_page(text: str) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
-    option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")
+    option(
+        "--keep",
+        type=Path,
+        help="file for the results, one per line; checks in this file are not repeated",
+    )
     option("--tips", action="store_true", help="check only one leaf link of each robot")
     option("--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md")
     option(

@@ -44,7 +44,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/trajectories.md": (
         "Trajectories",
-        "Samples of a log, and the motion of a frame along them, compared with Pinocchio.",
+        "Read trajectories, and compute a frame's motion along a trajectory. Pinocchio checks each sample.",
         "read_trajectory frame_motion urdfkin.robot.trajectory.Trajectory "
         "urdfkin.robot.frame_motion.FrameMotion",
     ),

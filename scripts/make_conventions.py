@@ -160,9 +160,9 @@ class MeasuredMotion:
     def velocity_readings(self) -> dict[str, FloatArray]:
         R, p, v, w, _, _ = self.motion()
         points = {
-            "of the frame's origin, in world axes": (v, w),
-            "of the frame's origin, in its own axes": (R.T @ v, R.T @ w),
-            "of the body point at the world origin, in world axes": (v - np.cross(w, p), w),
+            "velocity of the frame's origin, in world axes": (v, w),
+            "velocity of the frame's origin, in the frame's axes": (R.T @ v, R.T @ w),
+            "velocity of the body point at the world's origin, in world axes": (v - np.cross(w, p), w),
         }
         linear_first = {f"[linear; angular] {name}": np.concatenate(parts) for name, parts in points.items()}
         other = {f"[angular; linear] {name}": np.concatenate(parts[::-1]) for name, parts in points.items()}
@@ -174,8 +174,8 @@ class MeasuredMotion:
         linear = {
             "classical: the second derivative of the origin's position": a,
             "spatial: the classical acceleration minus w x v": spatial,
-            "classical, plus 9.81 m/s^2 upwards for gravity": a + up,
-            "spatial, plus 9.81 m/s^2 upwards for gravity": spatial + up,
+            "the classical acceleration plus 9.81 m/s^2 upwards because of gravity": a + up,
+            "the spatial acceleration plus 9.81 m/s^2 upwards because of gravity": spatial + up,
         }
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
@@ -214,17 +214,17 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
     at = measured.mj_data.xpos[measured.body]
     mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], at, measured.body)
     yield (
-        "rows of a Jacobian J, determined from J v",
+        "product of a Jacobian and the joint velocities",
         find_definition(robot.jacobian(measured.q, "l3") @ measured.v, readings),
         find_definition(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ measured.v, readings),
         f"`mj_jac`, `jacp` above `jacr`: {find_definition(columns @ measured.v, readings)}",
     )
     _, p, v, w, _, _ = measured.motion()
     com = measured.mj_data.subtree_com[measured.mj_model.body_rootid[measured.body]]
-    at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
+    at_com = "[angular; linear] velocity of the body point at the tree's centre of mass, in world axes"
     points = {
         at_com: np.concatenate((w, v + np.cross(w, com - p))),
-        "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
+        "[angular; linear] velocity of the frame's origin, in world axes": np.concatenate((w, v)),
     }
     stored = measured.data.v[measured.model.frames[measured.frame].parentJoint].vector
     yield (
@@ -343,8 +343,8 @@ def _free_body_rows() -> Iterator[Row]:
     )
     yield "q of a free body", ours, theirs, third
     axes = {
-        "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
-        "linear in world axes, angular in the body's own": np.concatenate((rates[:3], R @ rates[3:])),
+        "both in the body's axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
+        "linear in world axes, angular in the body's axes": np.concatenate((rates[:3], R @ rates[3:])),
         "both in world axes": rates,
     }
     six = np.empty(6)

@@ -43,10 +43,9 @@ def validate_on_cluster(*robots: Any, **how: Any) -> ValidationReport:
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
         own = 1e3 * (time.process_time() - before) / chunks
-        print(f"    {time.perf_counter() - begin:.1f} s without the start and the end of the workers")
+        print(f"    run time without starting and stopping the workers: {time.perf_counter() - begin:.1f} s")
         print(
-            f"    {own:.1f} ms of processor time in client and scheduler per chunk of samples;"
-            f" {chunks} chunks of samples"
+            f"    processor time of client and scheduler: {own:.1f} ms for each of {chunks} chunks of samples"
         )
         return report
 

@@ -93,7 +93,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
             "urdfkin against the others, medians",
             [_compare_with_best(*one) for one in _group_rows(batch)],
         )
-        title = "lower limits of the time for one configuration, by memory and by arithmetic"
+        title = "bytes and operations for one configuration"
         yield TextTable(
             "floor", title, [_compare_with_limits(*one, figures["operations"]) for one in _group_rows(batch)]
         )
