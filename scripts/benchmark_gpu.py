@@ -4,8 +4,9 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The share of the memory's bandwidth is the data rate of the code, divided by the
-data rate of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
+median of several launches. The last column is the data rate of the code, as a fraction of the bandwidth of
+the GPU's memory. The bandwidth is the data rate of a copy within this memory. A data rate counts the bytes
+that are read and written.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
 `torch.compile`. If PyTorch Kinematics is installed too, the program also measures this library's Jacobian.
@@ -44,8 +45,9 @@ from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
 
-#: Sizes of batches, and the number of measured launches of each.
+#: Numbers of configurations in a batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
+#: Number of timed launches for each quantity, precision and batch size.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
 #: Largest allowed error of PyTorch Kinematics' Jacobian; this library reads angles in single precision.
@@ -168,7 +170,7 @@ def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda
 def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
 
-    Raise ValueError if its Jacobian differs from the Jacobian that `robot` computes.
+    Raise ValueError if the Jacobians of PyTorch Kinematics and urdfkin differ.
     """
     import pytorch_kinematics
     import torch

@@ -12,11 +12,12 @@
 `--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
-compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
-configuration and in batches. The Python code runs with NumPy, and with NumPy as an array API namespace, in
-both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed random order, so that a
-stopped run has checked a random sample. Exit 1: a number is outside its bound, or a compiler prints a
-warning.
+compared with results at fifty digits. GCC and Clang compile the C code; a missing compiler is skipped. The
+compiled programs compute single configurations and batches. The Python code runs with NumPy, and with NumPy
+as an array API namespace, in both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed
+random order, so that a stopped run has checked a random sample.
+
+Exit 1: an error exceeds its bound, a function is not verified, or a compiler prints a warning.
 """
 
 import argparse
@@ -50,7 +51,8 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: A PyTorch or JAX file contains a Hessian up to this number of joint velocities, because the check is slow.
+#: Maximum number of joint velocities of a robot whose PyTorch or JAX file contains a Hessian.
+#: The check of a larger Hessian is slow.
 #: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
@@ -61,7 +63,7 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) 
 
 
 def error_ratios(written: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Yield the name of each compiled or Python program, and the largest error as a fraction of its bound."""
+    """Yield the name of each compiled or Python program, and its largest ratio of an error to a bound."""
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", written.name.upper()
         for compiler in filter(shutil.which, compilers if to in languages else ()):
@@ -87,7 +89,7 @@ def error_ratios(written: FrameCode, folder: Path, languages: Collection[str]) -
 
 
 def _largest_ratio(found: Sequence[float], count: int) -> float:
-    """Return the largest ratio of an error to its bound; NaN if one is NaN or one is missing."""
+    """Return the largest error ratio, or NaN if a ratio is NaN or there are not `count` ratios."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
@@ -158,7 +160,10 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _write_files(library: str, folder: Path) -> Iterator[Path]:
-    """Yield files with the code of each robot's tip frame, in a library's format and in `array`."""
+    """Write code for the tip frame of each robot, and yield the path of each file.
+
+    Each tip frame gets two files: one in the library's format, and one in the format `array`.
+    """
     for number, (_, robot, frame) in enumerate(leaf_frames(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)

@@ -192,7 +192,7 @@ def make_subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # The page of a method's subject documents the method, so the entry of `Robot` lists no methods.
+        # Other entries of `LIBRARY` document the methods, so the entry of the class `Robot` lists no methods.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {find_address(name)}\n    options:\n{lines}")

@@ -61,14 +61,17 @@ def make_case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one document after another, and may crash."""
+    """A process that tests one case after another. A case can crash the process."""
 
     def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
         self.work, self.timeout = work, timeout
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a document; return the outcome and its details; a crash or a timeout is also an outcome."""
+        """Test a case, and return the result and details.
+
+        A crash or a timeout of the process is a result too.
+        """
         if self.process is None:
             self.start()
         try:
@@ -101,7 +104,10 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Receive the family and number of a case, test the case, and send the outcome, until killed."""
+    """Test cases in a loop, which ends when the process is killed.
+
+    Each pass of the loop receives the family and number of a case, tests the case and sends the outcome.
+    """
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

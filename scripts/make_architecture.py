@@ -1,4 +1,4 @@
-"""Draw the imports between packages: docs/images/architecture.svg, and the table in docs/architecture.md.
+"""Draw the imports between packages. Write docs/images/architecture.svg and a table in docs/architecture.md.
 
 docs/architecture.toml defines the packages and their order. tests/test_architecture.py checks the imports
 with the functions of this script. Every import counts: imports for types, imports inside functions, and
@@ -58,7 +58,7 @@ def package_of(module: str) -> str:
 
 
 def imported_names(text: str) -> Iterator[str]:
-    """Yield the names that a module's text imports; a name from a string ends in `.*`.
+    """Yield the names that a module's text imports. A name from a string ends in `.*`.
 
     >>> list(imported_names("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']

@@ -1,11 +1,12 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
-For each row, the script compares a library's result with several candidate definitions, on a random robot and
-motion. The script writes the definition that matches. A test checks that the page is current.
+For most rows, the script computes a result of each library for a random motion of a given robot. The script
+also computes the quantity by several definitions, and writes the only definition that agrees with the result.
+A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue, in the library's convention, and writes the
-results to conventions.toml.
+first runs each installed library on all robots of the catalogue. Each library uses its own convention. The
+script writes the results to conventions.toml.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure

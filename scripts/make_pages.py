@@ -54,7 +54,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: The meaning of each warning for the robots of the catalogue that have it.
+#: Maps the code of each warning to the meaning of this warning for robots of the catalogue.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -123,7 +123,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # An entry without a description has the description of its type.
+            # If an entry has no description, the page shows the description of the entry's type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -232,7 +232,8 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance between neighbouring doubles at the quantity's largest number.
+            # A step is the distance between two neighbouring doubles.
+            # This distance is computed at the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

@@ -124,7 +124,10 @@ def draw_integral_of_w(figure: Any) -> None:
 
 
 def plot_euler_singularity(figure: Any) -> None:
-    """Plot the condition number of Omega (angle rates to angular velocity) against the middle angle."""
+    """Plot the condition number of the matrix Omega against the middle Euler angle.
+
+    Omega converts the rates of the Euler angles to the angular velocity.
+    """
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):

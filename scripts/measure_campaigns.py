@@ -36,7 +36,7 @@ def validate_with_store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def validate_on_cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local Dask workers; print the time without the start and the end of the workers."""
+    """Validate with two local Dask workers. The printed times exclude starting and stopping the workers."""
     with connect_cluster("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
         chunks = len(Chunking(how["samples"])) * len(robots[0])

@@ -5,13 +5,15 @@
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
-The script runs the quick tests that mention the mutated module or belong to its package. If no test fails,
---slow adds the slow tests of this kind, and --whole adds all other quick tests. The script prints every
-undetected mutant, and skips the mutants that docs/mutation.md lists as harmless. In the past, no test
-detected the named mutants. A named mutant replaces code of one function, and one given test must now fail.
+The script first runs the quick tests in the files that mention the mutated module, and in the files for the
+module's package. If no test fails, --slow runs the slow tests in these files. If still no test fails, --whole
+runs all quick tests. The script prints every undetected mutant, and skips the mutants that docs/mutation.md
+lists as harmless. In the past, no test detected the named mutants. A named mutant replaces code of one
+function, and one given test must now fail.
 
-Exit 0: all mutants are detected or harmless. 1: some mutants are not detected, or there is no mutant. 2: no
-file of the package begins with the given path.
+Exit 0: all mutants are detected or harmless.
+Exit 1: some mutants are not detected, or there is no mutant.
+Exit 2: no file of the package begins with the given path.
 """
 
 import argparse
@@ -114,7 +116,7 @@ class NamedMutant:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """The function's name in the file, the code, and its replacement: the arguments of `replace_code`."""
+        """The last three arguments of `replace_code`: the function's name, the old code and the new code."""
         return self.function[len(module_name(self.file)) + 1 :], self.before, self.after
 
 
@@ -125,7 +127,10 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Map each harmless mutant, by function and text, to the reason."""
+    """Return the reason why each harmless mutant is harmless.
+
+    A key is the function's full name and the text of the mutant.
+    """
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)

@@ -8,7 +8,9 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def insert_parts(page: str, **parts: str) -> str:
-    """Return a page with the given parts; a part must have exactly one place.
+    """Insert the given parts into a page, and return the page.
+
+    Raise ValueError unless the page has exactly one place for each part.
 
     >>> print(insert_parts("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->

@@ -1,12 +1,14 @@
-"""Run exported Python files in this interpreter, which needs no urdfkin, and print one JSON line for each.
+"""Run exported Python files in this interpreter, and print one JSON line for each file.
+
+The interpreter does not need urdfkin.
 
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-The first argument names the library, `torch` or `jax`. The script runs each file's own check; files of the
-format `array` use this library. A file with a Hessian contains the Hessian's true values and error bound. The
-library then differentiates the Jacobian, and each difference from these values must lie within the bound. For
-the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
+The first argument names the library, `torch` or `jax`. The script runs the function `check` of each file.
+Files of the format `array` use this library. A file with a Hessian contains the true Hessian and error
+bounds. For such a file, the library differentiates the Jacobian, and each error must lie within its bound.
+For the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
 `scripts/check_exports.py --library` calls this script.
 """
 
@@ -20,7 +22,7 @@ from typing import Any
 
 
 def error_ratios(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield each check's largest error as a share of its bound."""
+    """Yield the name of each check, and the largest ratio of an error to its bound."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -73,7 +75,7 @@ def check_compiled(scope: dict[str, Any]) -> float:
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio of a row's error to its bound; NaN counts as the largest number."""
+    """Return the largest ratio of an error to its bound. NaN counts as the largest number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

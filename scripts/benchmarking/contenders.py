@@ -193,7 +193,7 @@ def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return an array (n, 6, nv): the columns of `J` (n, 6, m) at the indices `columns`, else zeros."""
+    """Return an array of zeros (n, 6, nv), with the columns of `J` (n, 6, m) at the indices `columns`."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full

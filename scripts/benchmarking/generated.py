@@ -1,10 +1,12 @@
-"""Generate C code for one robot, frame and quantity; the code's speed is an upper limit for a general kernel.
+"""Generate C code for one robot, one frame and one quantity.
 
-CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
-and 1. Each number is a SIMD vector of doubles: several configurations are computed together (`generated.c`).
-The time includes sine, cosine and the transposition of the arrays. The code does not check its inputs: a
-non-finite number, or an angle of a million turns, gives a wrong result. urdfkin corrects the last digit of
-sine and cosine, and this code does not.
+The benchmark compares the speed of urdfkin's kernels, which compute any robot, with the speed of this code.
+CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
+constants, and omits products with 0 and 1. The code computes several configurations together: each number is
+a SIMD vector of doubles (`generated.c`). The time includes sine, cosine and the transposition of the arrays.
+
+The code does not check inputs. A non-finite number, or an angle of a million turns, gives a wrong result.
+urdfkin corrects the last digit of sine and cosine. The generated code does not correct this digit.
 """
 
 import ctypes
@@ -40,9 +42,10 @@ _Z = (0.0, 0.0, 1.0)
 def frame_results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
+    """Return the numbers of a frame's Jacobian or acceleration in world axes, row by row.
 
-    Each joint has one coordinate. The arguments may be any numbers that the functions of `eq` accept.
+    The Jacobian uses equation 7.85. The acceleration uses equations 7.127 to 7.130. Each joint has one
+    coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
@@ -81,7 +84,10 @@ def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
-    """Return a function of the batch size and the addresses of q, v, a and the results."""
+    """Compile the C code, and return its function.
+
+    The function's arguments are the batch size and the addresses of the arrays q, v, a and `out`.
+    """
     plan, folder = workload.plan, workload.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
@@ -111,7 +117,7 @@ def _join(numbers: Sequence[float]) -> str:
 
 
 def _generate_code(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code of a function of (x, sines, cosines, v, a) for one configuration."""
+    """Return CasADi's C code for one configuration. The inputs are x, sines, cosines, v and a."""
     import casadi
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]

@@ -23,7 +23,7 @@ from urdfkin.robot import Robot
 ROOT = Path(__file__).parents[2]
 #: Keys of the times of a first call: with an empty kernel cache, and with all kernels in the cache.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Number of inputs (q, v, a) of each quantity whose first call compiles a kernel.
+#: Methods whose first call compiles a kernel. Each value is the number of inputs among q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

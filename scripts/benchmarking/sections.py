@@ -1,4 +1,7 @@
-"""Measure the sections of the benchmark; before each measurement, all results are compared."""
+"""Measure the sections of the benchmark.
+
+Before each measurement, the results of all contenders are compared.
+"""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,11 +40,12 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 
 
 def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
+    """Time Jacobians and accelerations, and compare the results with Pinocchio's results.
 
-    The section `batch` measures batches, and `single` measures calls for one configuration. The section
-    `checked` measures urdfkin's calls for one configuration with a check of each result. The section
-    `verified` measures batches with a check of all results, of a sample of the results, or of no result.
+    The section `batch` times batches of all contenders. The section `single` times calls of all contenders
+    for one configuration. The sections `checked` and `verified` time only urdfkin and Pinocchio. In the
+    section `checked`, urdfkin computes one configuration per call, and checks each result. In the section
+    `verified`, urdfkin computes batches, and checks all results, a sample of the results, or no result.
     """
     for workload, quantity, table in _open_workloads(section, n):
         what = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
@@ -145,11 +149,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# The time of a step of a batch is the difference between the times of two kernels.
-# Only one of these kernels has the step's instructions.
-# For one configuration, the benchmark also measures calls that do only a part of the work.
-# An example is a call with a rejected argument.
-# The time of a step is a difference of these measured times.
+# For a batch, the benchmark times one kernel for each number k of steps.
+# The kernel executes the instructions of the first k steps.
+# The time of step k is the difference between the times for k steps and for k - 1 steps.
+# For one configuration, the benchmark times calls that do only a part of the work.
+# An example is a call that rejects the argument `out`.
+# The time of a step is computed from the differences between the times of these calls.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -249,7 +254,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # A line without a call measures the time of the loop.
+        "q",  # This line calls no function, so its time is the time of the loop.
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
         "empty(shape)",

@@ -17,7 +17,8 @@ Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: Title and row format of the sections that vary the number of joints, frames or configurations.
+#: Sections with measurements for several numbers of joints, frames or configurations.
+#: Each section has a title, and a function that returns the cells of a row.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -52,7 +53,7 @@ _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text; each entry of `cells` maps the headings to the cells of a row."""
+    """A table as text. Each element of `cells` is a row: a mapping from headings to cells."""
 
     section: str
     title: str
@@ -109,7 +110,8 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # Rows are grouped by quantity, then by contender; groups are in the order of their first rows.
+            # Rows are grouped by quantity, then by contender.
+            # Groups are in the order of their first rows.
             keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))
@@ -120,7 +122,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
 
 
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the figures inserted; raise ValueError if a place is missing or occurs twice."""
+    """Insert the figures into the page. Raise ValueError if a place is missing or occurs twice."""
     parts: dict[str, list[str]] = {"machine": [format_machine(figures)]}
     for words in make_tables(figures):
         parts.setdefault(words.section, []).append(words.text)
@@ -174,7 +176,7 @@ def _generated_time(rows: Sequence[Entry]) -> float | None:
 
 
 def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
-    """Compare urdfkin, with one thread and with all threads, with the fastest other contender."""
+    """Compare urdfkin with Pinocchio's loop, with the generated code and with the fastest other library."""
     rows = {row["label"]: row for row in group}
     several = next((row for row in group if _SEVERAL.fullmatch(row["label"])), None)
     one, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
@@ -194,7 +196,7 @@ def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
 
 
 def _compare_with_limits(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
-    """Compare urdfkin's time with two lower limits: to write the output, and to do the arithmetic."""
+    """Return urdfkin's time, the time to write the output, and the bytes and operations per nanosecond."""
     rows = {row["label"].partition(",")[0]: row for row in reversed(group)}
     fill, ns = rows[FLOOR], rows["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]

@@ -23,7 +23,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class TimedTask:
-    """A timed task; `compute` uses the first `n` configurations of the workload."""
+    """A timed task. One call of `compute` computes the first `n` configurations of the workload."""
 
     label: str
     n: int
@@ -61,7 +61,10 @@ class DifferenceError(Exception):
 
 
 def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str) -> None:
-    """Compute all results once as a warm-up; raise DifferenceError if one differs from `reference`."""
+    """Compute all results once as a warm-up.
+
+    Raise DifferenceError if the result of a task differs from the result of `reference`.
+    """
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -134,9 +137,10 @@ class Calls:
     label: str
     names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
     lines: tuple[str, ...]  # The value of the last line is the result.
-    #: Lines that write the result of configuration k into `out[k]`; None writes the value of the last line.
+    #: Lines that write the result of configuration k into `out[k]`.
+    #: If None, the value of the last line of `lines` is written into `out[k]`.
     store: tuple[str, ...] | None = None
-    #: Index in urdfkin of each coordinate of the library; None if the orders are equal.
+    #: `order[i]` is urdfkin's index of the library's coordinate i. None means that the orders are equal.
     order: list[int] | None = None
     #: Shape of one configuration's result in a batch; None means urdfkin's shape.
     shape: tuple[int, ...] | None = None
@@ -154,14 +158,14 @@ class Calls:
         return TimedTask(self.label, workload.loop, run, result, remark=self.remark)
 
     def make_loop(self) -> Callable[..., None]:
-        """Return a function that loops over a batch; it writes the results to `out`."""
+        """Return a function that loops over a batch and writes the results to `out`."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _compile_function(
             self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body
         )
 
     def make_single_task(self, workload: Workload, quantity: str) -> TimedTask:
-        """Return the timed task for single calls; their results are not stored."""
+        """Return the timed task for single calls. The timed loop does not store results."""
         inputs = [list(self._reorder(x)) for x in workload.inputs(quantity, workload.loop)]
         rows = list(_rows(inputs))
         repeat = _compile_function(self.names, "rows_", "for q, v, a in rows_:", self.lines)

@@ -77,9 +77,10 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """Return a URDF with only the links and joints, without mimic rules, and with equal inertias.
+    """Return a copy of a URDF without shapes and mimic rules.
 
-    Some libraries need inertias. Some libraries add a body `world`, so a link with this name is renamed.
+    All links of the copy have the same mass and inertia, because some libraries need inertias. Some libraries
+    add a body `world`, so a link or joint with this name is renamed.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

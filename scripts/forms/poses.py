@@ -1,11 +1,12 @@
-"""Compute the poses of a table exported as Python, in an interpreter that has the needed library.
+"""Compute the poses of Denavit-Hartenberg tables that are exported as Python code.
 
     python scripts/forms/poses.py JOBS RESULTS
 
 The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses
 for each entry of JOBS.
 
-The script does not import urdfkin, because the Robotics Toolbox may have its own environment.
+The interpreter needs the library that the code imports. The script does not import urdfkin, because the
+Robotics Toolbox may have its own environment.
 """
 
 import json

@@ -16,7 +16,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference from MuJoCo's placements, and between the sides of an equality constraint.
+#: Relative tolerance for placements, which are compared with MuJoCo's placements.
+#: The relative tolerance for equality constraints is a thousand times as large.
 _TOLERANCE = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.

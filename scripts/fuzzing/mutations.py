@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size (bytes) of a robot file of which mutants are made. Larger files are slow and are left out.
+#: Maximum size (bytes) of a file whose mutants are tested. Larger files are slow, so they are left out.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -43,7 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: `_STRUCTURE` is chosen three times as often as another family, because most other mutants are rejected.
+#: `_STRUCTURE` occurs three times, because urdfkin rejects most mutants of the other families.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")

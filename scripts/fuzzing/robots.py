@@ -32,7 +32,8 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
-#: Elements of other programs, which a URDF reader must not interpret as joints; {p} is a prefix.
+#: XML elements that other programs add to URDF files. {p} is a namespace prefix.
+#: A URDF reader must not read links, joints or mimic rules from these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -52,7 +53,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def format_number(rng: random.Random, x: float) -> str:
-    """Return a number, sometimes slightly changed, as text in a random notation."""
+    """Return a number as text in a random notation. Some notations round the number."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain

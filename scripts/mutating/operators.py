@@ -27,9 +27,9 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant, which puts a new value into the list or syntax node `container`.
+    """One mutant: a new value for an element of a list or for a field of a syntax node.
 
-    `key` is an index of the list, or the name of a field of the node.
+    `container` is the list or the syntax node. `key` is the index of the element or the name of the field.
     """
 
     node: ast.AST  # The description of the mutant quotes the text of this node.
@@ -50,7 +50,10 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Change the tree in place until the end of the `with` block; yield the previous value."""
+        """Change the tree in place, and yield the previous value.
+
+        The end of the `with` block restores the tree.
+        """
         old = self.put(self.value)
         try:
             yield old
@@ -67,7 +70,7 @@ class Change:
 
 
 def list_changes(tree: ast.Module) -> list[Change]:
-    """Return all mutants of a file in a fixed order; applying a mutant changes the given tree."""
+    """Return all mutants of a file in a fixed order. Each mutant refers to nodes of the given tree."""
     return [
         change
         for node in _executed_nodes(tree)
@@ -132,7 +135,7 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
-    """Parse code as an expression. If the code is no expression, parse it as statements and as arguments."""
+    """Parse code as an expression, or as statements and as arguments if the code is not an expression."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
