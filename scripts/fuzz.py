@@ -121,9 +121,9 @@ def run_worker(seed: int, pipe: Connection) -> None:
 
 
 def fuzz(
-    asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
+    cases: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    waiting = iter(list(asked))
+    waiting = iter(list(cases))
     counts: collections.Counter[str] = collections.Counter()
 
     def run(_: int) -> None:
@@ -132,13 +132,13 @@ def fuzz(
             word, details = worker.evaluate(family, number)
             counts[word] += 1
             if word not in PASSED:
-                made = make_case(seed, family, number)
+                case = make_case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
-                (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(made.data)
-                note = f"{made.description}\n{word}\n{details}\n"
+                (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(case.data)
+                note = f"{case.description}\n{word}\n{details}\n"
                 (keep / f"{family}-{seed}-{number}.txt").write_text(note, "utf-8")
-                print(f"{family} {number} ({made.name}): {word}", flush=True)
+                print(f"{family} {number} ({case.name}): {word}", flush=True)
         worker.stop(0.0)
 
     with ThreadPoolExecutor(jobs) as pool:
@@ -148,8 +148,8 @@ def fuzz(
 
 def list_cases(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
     chosen = [family for family in families if family != MUTANTS]
-    asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
-    return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
+    mutant_cases = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
+    return mutant_cases + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
 
 
 def main() -> int:
@@ -165,13 +165,13 @@ def main() -> int:
     option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
     options = parser.parse_args()
     families = options.family or FAMILIES
-    asked = list_cases(families, options.mutants, options.robots)
+    cases = list_cases(families, options.mutants, options.robots)
     if options.only is not None:
         if len(families) != 1:
             parser.error("--only needs exactly one --family")
-        asked = [(families[0], options.only)]
+        cases = [(families[0], options.only)]
     start = time.perf_counter()
-    counts = fuzz(asked, options.seed, options.jobs, options.timeout, options.keep)
+    counts = fuzz(cases, options.seed, options.jobs, options.timeout, options.keep)
     seconds, total = time.perf_counter() - start, sum(counts.values())
     print(f"{total} robots of {len(families)} families, seed {options.seed}, {seconds:.0f} s")
     for word, count in counts.most_common():

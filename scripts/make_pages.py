@@ -81,7 +81,7 @@ LIMITS = {
 
 def make_findings_parts() -> dict[str, str]:
     limits = [
-        (f"{limit:,} {words}", f"`{option}`" * bool(option)) for option, (limit, words) in LIMITS.items()
+        (f"{limit:,} {meaning}", f"`{option}`" * bool(option)) for option, (limit, meaning) in LIMITS.items()
     ]
     codes = []
     for digit, family in FAMILIES.items():
@@ -98,17 +98,19 @@ def make_findings_parts() -> dict[str, str]:
         ]
         heads = ("code", "name", "severity", "finding", "Pinocchio")
         codes.append(f"### {family}\n\n{table(heads, rows)}\n")
-    found = []
-    for name, finding in ((one, finding) for one in catalogue() for finding in list_warnings(one)):
+    robot_rows = []
+    for name, finding in ((robot, finding) for robot in catalogue() for finding in list_warnings(robot)):
         lines = f"line {finding.line}" + (
             f" and {len(finding.other_lines)} more" if finding.other_lines else ""
         )
-        what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-        found.append((name, finding.code, lines, _escape(shorten(what, 200)), REMARKS[finding.code]))
+        description = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
+        robot_rows.append(
+            (name, finding.code, lines, _escape(shorten(description, 200)), REMARKS[finding.code])
+        )
     return {
         "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
         "codes": "\n".join(codes),
-        "robots": table(("robot", "code", "where", "what", "meaning"), found),
+        "robots": table(("robot", "code", "where", "what", "meaning"), robot_rows),
     }
 
 
@@ -258,13 +260,13 @@ def _chain_rows() -> Iterator[tuple[object, ...]]:
 
 def _compute_enclosures(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
     """Return interval results of random motions, and the processor time (ms) per motion."""
-    found, times = [], []
+    enclosures, times = [], []
     for seed in (0, *range(count)):  # The first motion is not timed.
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
         q, begin = robot.sample(1, seed)[0], time.process_time()
-        found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
+        enclosures.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
         times.append(time.process_time() - begin)
-    return found[1:], 1e3 * sum(times[1:]) / count
+    return enclosures[1:], 1e3 * sum(times[1:]) / count
 
 
 def make_askew_chain(length: int) -> str:

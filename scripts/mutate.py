@@ -79,19 +79,22 @@ def find_near_tests(path: Path) -> list[str]:
     If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
     """
     package, _, name = module_name(path).rpartition(".")
-    named = re.compile(
+    pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
-    near = {
+    mentioning_tests = {
         test
         for test, text in _read_tests().items()
-        if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
+        if test.stem == f"test_{path.stem}" or (name in text and pattern.search(text))
     }
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     for parts in ((part, f"test_{part}.py"), ("test_robot.py", "verify", "laws")):
-        if own := {test for test in _read_tests() if test.relative_to(TESTS).parts[0] in parts}:
+        if package_tests := {test for test in _read_tests() if test.relative_to(TESTS).parts[0] in parts}:
             break
-    order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
+    order = sorted(
+        mentioning_tests | package_tests,
+        key=lambda test: (path.stem not in test.stem, test not in mentioning_tests, str(test)),
+    )
     return [str(test.relative_to(ROOT)) for test in order]
 
 
@@ -156,7 +159,7 @@ class Outcome:
 
 
 def list_mutants(parts: list[str]) -> list[Mutant]:
-    found = []
+    mutants = []
     for path in find_files(parts):
         tree, module, file = (
             ast.parse(path.read_text(encoding="utf-8")),
@@ -164,9 +167,9 @@ def list_mutants(parts: list[str]) -> list[Mutant]:
             path.relative_to(ROOT),
         )
         for number, change in enumerate(list_changes(tree)):
-            place = ".".join(filter(None, (module, function_at(tree, change.line))))
-            found.append(Mutant(f"{module}:{number}", str(file), change.line, change.text, place))
-    return found
+            function = ".".join(filter(None, (module, function_at(tree, change.line))))
+            mutants.append(Mutant(f"{module}:{number}", str(file), change.line, change.text, function))
+    return mutants
 
 
 def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
@@ -252,14 +255,21 @@ def main() -> int:
         parser.error(str(error))
     runs: list[Callable[[], Outcome]]
     if options.named:
-        named = [one for one in named_mutants() if not options.parts or module_name(one.file) in modules]
-        runs = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
+        selected_mutants = [
+            named_mutant
+            for named_mutant in named_mutants()
+            if not options.parts or module_name(named_mutant.file) in modules
+        ]
+        runs = [
+            partial(evaluate_named, named_mutant, timeout=options.timeout)
+            for named_mutant in selected_mutants
+        ]
     else:
         chosen = [mutant for mutant in list_mutants(options.parts) if options.only in (None, mutant.name)]
         if options.sample is not None and options.sample < len(chosen):
             chosen = random.Random(options.seed).sample(chosen, options.sample)
-        how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-        runs = [partial(evaluate, mutant, **how) for mutant in chosen]
+        settings = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
+        runs = [partial(evaluate, mutant, **settings) for mutant in chosen]
     if not runs:
         print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1
@@ -272,8 +282,8 @@ def main() -> int:
             counts[outcome.result] += 1
             if outcome.result != "detected":
                 mutant = outcome.mutant
-                where = f"{mutant.function}:{mutant.line}: {mutant.change}  [{mutant.name}]"
-                print(f"{outcome.result}: {where}", flush=True)
+                location = f"{mutant.function}:{mutant.line}: {mutant.change}  [{mutant.name}]"
+                print(f"{outcome.result}: {location}", flush=True)
     print(f"{len(runs)} mutants: " + ", ".join(f"{n} {result}" for result, n in counts.most_common()))
     return 0 if counts.keys() <= {"detected", "harmless"} else 1
 

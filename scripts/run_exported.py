@@ -61,7 +61,7 @@ def check_hessian(scope: dict[str, Any], library: str) -> float:
 def check_compiled(scope: dict[str, Any]) -> float:
     import torch
 
-    found = 0.0
+    largest = 0.0
     for name, letters in scope["INPUTS"].items():
         if name == "hessian":  # The compilation takes minutes.
             continue
@@ -70,8 +70,8 @@ def check_compiled(scope: dict[str, Any]) -> float:
         for kind, eps, table in (("float64", 2.0**-52, "WITHIN"), ("float32", 2.0**-23, "SINGLE")):
             values = scope["_values"](compiled, inputs, kind, "cpu")
             share = max_error_ratio(values, scope["TRUE"][name], scope[table][name], eps)
-            found = found if share <= found else share
-    return found
+            largest = largest if share <= largest else share
+    return largest
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
@@ -89,11 +89,11 @@ def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
 def main(library: str, paths: list[str]) -> None:
     compiled = True
     for path in paths:
-        found: dict[str, float] = {}
+        ratios: dict[str, float] = {}
         for name, share in error_ratios(path, library, compiled):
-            found[name] = share if not share <= found.get(name, 0.0) else found.get(name, 0.0)
+            ratios[name] = share if not share <= ratios.get(name, 0.0) else ratios.get(name, 0.0)
         compiled = compiled and not path.endswith("_torch.py")
-        print(json.dumps({"file": Path(path).stem, "library": library, **found}), flush=True)
+        print(json.dumps({"file": Path(path).stem, "library": library, **ratios}), flush=True)
 
 
 if __name__ == "__main__":

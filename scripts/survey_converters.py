@@ -113,16 +113,18 @@ def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> 
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
     script = f"import pathlib, sys\nsource, to = sys.argv[1:]\n{program}"
-    words = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
+    command = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, cwd=folder)
+        process = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=300, cwd=folder
+        )
     except subprocess.TimeoutExpired:
         raise RefusalError(f"{tool} does not finish within 300 s") from None
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if "Error: " in line] or ["no message"]
-        error = " ".join(done.stderr[done.stderr.rindex(lines[-1]) :].split()).partition("Error: ")[2]
+    if process.returncode:
+        lines = [line for line in process.stderr.splitlines() if "Error: " in line] or ["no message"]
+        error = " ".join(process.stderr[process.stderr.rindex(lines[-1]) :].split()).partition("Error: ")[2]
         raise RefusalError(f"{'the converter' if len(pythons) == 1 else tool} refuses it: {error[:_QUOTED]}")
-    return source, Path(f"{to}{writes}" if writes else done.stdout.strip().splitlines()[-1])
+    return source, Path(f"{to}{writes}" if writes else process.stdout.strip().splitlines()[-1])
 
 
 def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
@@ -155,20 +157,22 @@ def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tup
     distance that rounding to single precision can cause.
     """
     try:
-        found = _compare(tool, pythons, robot)
+        comparison = _compare(tool, pythons, robot)
     except RefusalError as refusal:
         return str(refusal), "", ""
-    verdict = found.verdict.value
-    if found.verdict is Verdict.SAME_AFTER:
-        verdict = f"equivalent up to {', '.join(found.up_to)}"
-    elif not found:
-        verdict = str(found.unexplained[0]) if found.unexplained else found.differences[0].words
+    verdict = comparison.verdict.value
+    if comparison.verdict is Verdict.SAME_AFTER:
+        verdict = f"equivalent up to {', '.join(comparison.up_to)}"
+    elif not comparison:
+        verdict = (
+            str(comparison.unexplained[0]) if comparison.unexplained else comparison.differences[0].words
+        )
     if tool != "urdf-usd-converter":
-        return verdict, length(found.bound_as_written[0]), angle(found.bound_as_written[1])
-    off = length(0.0 if found.worst is None else found.worst.upper)
-    if found.single is None:
-        return "the stage has no rounded number", off, ""
-    return verdict, off, length(found.single[0])
+        return verdict, length(comparison.bound_as_written[0]), angle(comparison.bound_as_written[1])
+    distance = length(0.0 if comparison.worst is None else comparison.worst.upper)
+    if comparison.single is None:
+        return "the stage has no rounded number", distance, ""
+    return verdict, distance, length(comparison.single[0])
 
 
 def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:

@@ -48,12 +48,12 @@ def frame_results(
     coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
-    for i, (kind, _, place) in enumerate(plan.steps.tolist()):
+    for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):
         R, d = _pose(plan.geometry[i])
         state = recursion.rotate_frame(recursion.translate_frame(state, d), R)
-        turns = JointMotion(kind) is JointMotion.REVOLUTE
-        columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
-        if turns:
+        is_revolute = JointMotion(kind) is JointMotion.REVOLUTE
+        columns.append(Column(eq.rotate(state.R, _Z), is_revolute, state, i, velocity_index, 1.0))
+        if is_revolute:
             S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
             state = recursion.after_revolute(state, _Z, S, v[i], a[i])
         elif JointMotion(kind) is JointMotion.PRISMATIC:
@@ -89,11 +89,11 @@ def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
     The function's arguments are the batch size and the addresses of the arrays q, v, a and `out`.
     """
     plan, folder = workload.plan, workload.folder
-    turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
+    is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
         "Q_AT": plan.steps[:, StepField.Q],
         "V_AT": plan.steps[:, StepField.V],
-        "TURNS": turns.astype(int),
+        "TURNS": is_revolute.astype(int),
     }
     macros = {
         **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": workload.result_size(quantity)},
@@ -101,7 +101,9 @@ def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
         **{name: _join(getattr(python_numbers, name)) for name in ("SINE", "COSINE")},
     }
     lines = [f"#define {name} {value}" for name, value in macros.items()]
-    lines += [f"static const int {name}[] = {{{_join(at.tolist())}}};" for name, at in tables.items()]
+    lines += [
+        f"static const int {name}[] = {{{_join(indices.tolist())}}};" for name, indices in tables.items()
+    ]
     lines.append(_generate_code(plan, quantity))
     (folder / f"{quantity}.h").write_text("\n".join(lines), "utf-8")
     library = folder / f"{quantity}.so"

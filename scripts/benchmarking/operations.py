@@ -129,10 +129,10 @@ def count_operations(plan: CompiledTree, quantity: str) -> int:
     angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
     output = {"jacobian": "placement"}.get(quantity, quantity)
     state = getattr(run.call, f"mask_for_{output}")(run.state)
-    total, at = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
-    while words[at] != Op.END:
-        total += _count_instruction(run, words[at : at + INSTRUCTION_WIDTH], quantity, state)
-        at += INSTRUCTION_WIDTH
+    total, position = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
+    while words[position] != Op.END:
+        total += _count_instruction(run, words[position : position + INSTRUCTION_WIDTH], quantity, state)
+        position += INSTRUCTION_WIDTH
     return total
 
 

@@ -74,7 +74,7 @@ def _draw_bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
     axes.set_title(f"{robot}, {TITLES[quantity]}: time for one configuration", loc="left", fontsize=12)
 
 
-def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str) -> None:
+def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, unit: str) -> None:
     for quantity, (mark, line) in MARKS.items():
         chosen = [row for row in _select_rows(rows, section, quantity) if row["label"].startswith("urdfkin")]
         sizes = [row["size"] for row in chosen]
@@ -87,7 +87,7 @@ def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one
     axes.set_ylim(0.0, 1.1 * max(float(axes.dataLim.y1), 1.0) if rows else None)
     axes.set_xlabel(label)
     axes.set_ylabel("time [ns]")
-    axes.set_title(f"urdfkin, 1 thread: time for one {one}", loc="left", fontsize=12)
+    axes.set_title(f"urdfkin, 1 thread: time for one {unit}", loc="left", fontsize=12)
     axes.legend(frameon=False)
 
 

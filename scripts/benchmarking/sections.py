@@ -48,7 +48,7 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
     `verified`, urdfkin computes batches, and checks all results, a sample of the results, or no result.
     """
     for workload, quantity, table in _open_workloads(section, n):
-        what = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
+        title = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
         calls = pinocchio_calls(workload.urdf, workload.frame, quantity)
         loop = calls.make_batch_task(workload, quantity)
         if section == "batch":
@@ -56,14 +56,14 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
             loop = next(task for task in tasks if task.label == PROCESSES)
             baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "single":
-            found = [
-                one for contender in contenders for one in contender.make_single_calls(workload, quantity)
+            single_calls = [
+                call for contender in contenders for call in contender.make_single_calls(workload, quantity)
             ]
-            tasks = [one.make_single_task(workload, quantity) for one in found]
+            tasks = [call.make_single_task(workload, quantity) for call in single_calls]
             baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "checked":
             checked = urdfkin_calls(workload, quantity, verify=True)
-            tasks = [one.make_single_task(workload, quantity) for one in (*checked, calls)]
+            tasks = [call.make_single_task(workload, quantity) for call in (*checked, calls)]
             baseline = tasks[-1]
         else:
             baseline = loop = replace(loop, label=STORED)
@@ -76,7 +76,7 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
                 tasks.append(
                     replace(all_joints_calls(workload).make_batch_task(workload, quantity), label=ALL_JOINTS)
                 )
-        check_agreement(tasks, loop, what)
+        check_agreement(tasks, loop, title)
         clock = time.perf_counter if section in ("batch", "single") else time.thread_time
         yield from measure_rows(table, tasks, rounds, baseline, clock)
 
@@ -176,10 +176,10 @@ def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         ]
         if quantity == "acceleration":
             tasks = [task for task in tasks if task.label != "columns"]
-        found = measure_times(tasks, rounds)
+        times = measure_times(tasks, rounds)
         before, parts = np.zeros(rounds), {}
-        for label, taken in found.items():
-            parts[label], before = taken - before, taken
+        for label, total in times.items():
+            parts[label], before = total - before, total
         yield _make_entry("batch", workload, quantity, parts, before)
 
 

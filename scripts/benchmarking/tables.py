@@ -92,20 +92,22 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable(
             "summary",
             "urdfkin against the others, medians",
-            [_compare_with_best(*one) for one in _group_rows(batch)],
+            [_compare_with_best(*group) for group in _group_rows(batch)],
         )
         title = "bytes and operations for one configuration"
         yield TextTable(
-            "floor", title, [_compare_with_limits(*one, figures["operations"]) for one in _group_rows(batch)]
+            "floor",
+            title,
+            [_compare_with_limits(*group, figures["operations"]) for group in _group_rows(batch)],
         )
-    for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
+    for kind, description in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
-            yield _make_step_table(f"{what}: where the time goes, ns for one configuration", chosen)
+            yield _make_step_table(f"{description}: where the time goes, ns for one configuration", chosen)
     if entries := figures.get("first"):
         heads = {"without stored kernels": EMPTY, "with stored kernels": STORED}
         times = [
-            {"": one["what"], **{head: format_number(one[key] / 1e3) for head, key in heads.items()}}
-            for one in entries
+            {"": entry["what"], **{head: format_number(entry[key] / 1e3) for head, key in heads.items()}}
+            for entry in entries
         ]
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
@@ -151,8 +153,8 @@ def _group_rows(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 
 def _make_contender_table(section: str, title: str, rows: list[Entry]) -> TextTable:
     cost, single = section in ("checked", "verified"), section in ("single", "checked")
-    what = "calls" if single else "results stored" if cost else "loop"
-    ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {what}"
+    baseline = "calls" if single else "results stored" if cost else "loop"
+    ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {baseline}"
     remarks = list(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     ceiling = _generated_time(rows)
     cells = [
@@ -179,19 +181,21 @@ def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
     """Compare urdfkin with Pinocchio's loop, with the generated code and with the fastest other library."""
     rows = {row["label"]: row for row in group}
     several = next((row for row in group if _SEVERAL.fullmatch(row["label"])), None)
-    one, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
+    one_thread_ns, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
     others = [row for row in group if not row["label"].startswith(("urdfkin", FLOOR, GENERATED))]
     best = min(others, key=lambda row: float(row["median_ns"]))
     compiled = format_number(rows[COMPILED]["ratio"]) if COMPILED in rows else "not measured"
     return {
         "": title,
-        "1 thread, ns": format_number(one),
+        "1 thread, ns": format_number(one_thread_ns),
         "speed relative to Pinocchio's loop": format_number(rows[ONE]["ratio"]),
         "relative speed with all threads": format_number(several["ratio"]) if several else "one processor",
         "relative speed compiled for this robot, 1 thread": compiled,
-        _SHARE: format_number(ceiling / one) if ceiling else "not measured",
+        _SHARE: format_number(ceiling / one_thread_ns) if ceiling else "not measured",
         "fastest other library, ns": f"{best['label']}, {format_number(best['median_ns'])}",
-        "speed of urdfkin, 1 thread, relative to this library": format_number(best["median_ns"] / one),
+        "speed of urdfkin, 1 thread, relative to this library": format_number(
+            best["median_ns"] / one_thread_ns
+        ),
     }
 
 

@@ -60,7 +60,7 @@ class DifferenceError(Exception):
     """The results of contenders differ, so their times are not comparable."""
 
 
-def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str) -> None:
+def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str) -> None:
     """Compute all results once as a warm-up.
 
     Raise DifferenceError if the result of a task differs from the result of `reference`.
@@ -77,17 +77,17 @@ def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str)
         n = min(len(ours), len(expected))
         ours, theirs = ours[:n], expected[:n]
         if ours.shape != theirs.shape:
-            raise DifferenceError(f"{what}: {task.label} has the shape {ours.shape}, not {theirs.shape}")
+            raise DifferenceError(f"{title}: {task.label} has the shape {ours.shape}, not {theirs.shape}")
         if not np.allclose(ours, theirs, rtol=0.0, atol=task.tolerance):
             worst = float(np.abs(ours - theirs).max())
-            raise DifferenceError(f"{what}: {task.label} and {reference.label} differ by {worst:.3g}")
+            raise DifferenceError(f"{title}: {task.label} and {reference.label} differ by {worst:.3g}")
 
 
 def measure_times(
     tasks: Sequence[TimedTask], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
     """Return the times (ns) for one configuration, one for each round."""
-    found: dict[str, list[float]] = {task.label: [] for task in tasks}
+    times: dict[str, list[float]] = {task.label: [] for task in tasks}
     shuffled, order = list(tasks), random.Random(0)
     gc.disable()
     try:
@@ -97,10 +97,10 @@ def measure_times(
                 task.compute()
                 begin = clock()
                 task.compute()
-                found[task.label].append((clock() - begin) / task.n * 1e9)
+                times[task.label].append((clock() - begin) / task.n * 1e9)
     finally:
         gc.enable()
-    return {label: np.array(values) for label, values in found.items()}
+    return {label: np.array(values) for label, values in times.items()}
 
 
 def measure_rows(
@@ -111,15 +111,15 @@ def measure_rows(
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
     """Measure tasks that have already run once, so that their kernels are compiled."""
-    found = measure_times(tasks, rounds, clock)
-    medians = {label: float(np.median(values)) for label, values in found.items()}
+    times = measure_times(tasks, rounds, clock)
+    medians = {label: float(np.median(values)) for label, values in times.items()}
     return [
         replace(
             table,
             label=task.label,
             n=task.n,
             median_ns=round(medians[task.label], 3),
-            minimum_ns=round(float(found[task.label].min()), 3),
+            minimum_ns=round(float(times[task.label].min()), 3),
             ratio=None if baseline is None else round(medians[baseline.label] / medians[task.label], 3),
             remark=task.remark,
         )

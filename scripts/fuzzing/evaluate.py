@@ -55,11 +55,11 @@ def evaluate(case: Case) -> Outcome:
 
 
 def _evaluate(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
-    how: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
-    findings = urdfkin.check(case.data, **how)
+    options: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
+    findings = urdfkin.check(case.data, **options)
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     try:
-        robot = urdfkin.load(case.data, **how)
+        robot = urdfkin.load(case.data, **options)
     except UrdfError as error:
         if errors:
             return Outcome("refused", errors[0].code)
@@ -86,9 +86,9 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
     if _SIZES & {finding.code for finding in findings}:
         too_large = "too large to compute, with a finding that states the reason"
     try:
-        for what, result in compute_all(robot, seed=0):
+        for computation, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
-                return Outcome(too_large, what)
+                return Outcome(too_large, computation)
         # The certificate does not cover DH tables. A table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
@@ -204,9 +204,9 @@ def _compare_calls(
         yield name, every
         for frame in alone:
             batch = _compute(robot, name, inputs, frame, reference, base)
-            one = _compute(robot, name, single, frame, reference, base)
+            single_result = _compute(robot, name, single, frame, reference, base)
             _check_equal(f"{name} of several frames and of {frame!r}", every[:, frames.index(frame)], batch)
-            _check_equal(f"{name} of {frame!r} in a batch and alone", batch[1], one)
+            _check_equal(f"{name} of {frame!r} in a batch and alone", batch[1], single_result)
     for frame in alone:
         words = (frame, reference)
         rate = robot.jacobian_rate(q, v, *words, base=base)
@@ -222,16 +222,16 @@ def _placements_by_name(
 ) -> Iterator[tuple[str, FloatArray]]:
     """Yield placements of frames by name. urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
-    own = sorted(links | joints)
-    asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
-    for i in generator.permutation(len(asked))[:TESTED_NAMES]:
+    names = sorted(links | joints)
+    prefixed_names = [f"{prefix}{name}" for name in names for prefix in ("", "link:", "joint:")]
+    for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
-            yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
+            yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
         except UnknownNameError:  # For example, `joint:x` is unknown if x is only a link.
-            if asked[i] in own:
+            if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.
-            if asked[i] not in links & joints:
+            if prefixed_names[i] not in links & joints:
                 raise
 
 

@@ -104,22 +104,22 @@ def replace_code(source: str, function: str, before: str, after: str) -> ast.Mod
     do not matter. Raise ValueError unless `before` occurs exactly once in the function.
     """
     tree = ast.parse(source)
-    wanted = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
-    found = [
-        (node, field, at, len(texts))
+    alternatives = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
+    matches = [
+        (node, field, index, len(texts))
         for node in ast.walk(_definition(tree, function))
         for field, value in ast.iter_fields(node)
         for nodes in [value if isinstance(value, list) else [value]]
-        for texts in wanted
-        for at in range(len(nodes))
-        if [ast.unparse(x) for x in nodes[at : at + len(texts)] if isinstance(x, ast.AST)] == texts
+        for texts in alternatives
+        for index in range(len(nodes))
+        if [ast.unparse(x) for x in nodes[index : index + len(texts)] if isinstance(x, ast.AST)] == texts
     ]
-    if len(found) != 1:
-        raise ValueError(f"found {len(found)} times in {function or 'the file'}: {before}")
-    (node, field, at, size), *_ = found
+    if len(matches) != 1:
+        raise ValueError(f"found {len(matches)} times in {function or 'the file'}: {before}")
+    (node, field, index, size), *_ = matches
     old = getattr(node, field)
     if isinstance(old, list):
-        old[at : at + size] = _parse_as(after, type(old[at]))
+        old[index : index + size] = _parse_as(after, type(old[index]))
     else:
         setattr(node, field, _parse_as(after, type(old))[0])
     return ast.fix_missing_locations(tree)
