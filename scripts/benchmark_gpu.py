@@ -45,7 +45,7 @@ from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
 
-#: Numbers of configurations in a batch.
+#: Batch sizes: the number of configurations in each batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 #: Number of timed launches for each quantity, precision and batch size.
 LAUNCHES = 21

@@ -40,11 +40,11 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 
 
 def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Time Jacobians and accelerations, and compare the results with Pinocchio's results.
+    """Measure the times of Jacobians and accelerations, and compare the results with Pinocchio's results.
 
-    The section `batch` times batches of all contenders. The section `single` times calls of all contenders
-    for one configuration. The sections `checked` and `verified` time only urdfkin and Pinocchio. In the
-    section `checked`, urdfkin computes one configuration per call, and checks each result. In the section
+    The section `batch` measures batches of all contenders. The section `single` measures calls of all
+    contenders for one configuration. The sections `checked` and `verified` measure urdfkin and Pinocchio. In
+    the section `checked`, urdfkin computes one configuration per call, and checks each result. In the section
     `verified`, urdfkin computes batches, and checks all results, a sample of the results, or no result.
     """
     for workload, quantity, table in _open_workloads(section, n):
@@ -149,10 +149,10 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# For a batch, the benchmark times one kernel for each number k of steps.
+# For a batch, the benchmark measures one kernel for each number k of steps.
 # The kernel executes the instructions of the first k steps.
-# The time of step k is the difference between the times for k steps and for k - 1 steps.
-# For one configuration, the benchmark times calls that do only a part of the work.
+# The time of step k is the difference between the times of the kernels for k and k - 1 steps.
+# For one configuration, the benchmark measures calls that do only a part of the work.
 # An example is a call that rejects the argument `out`.
 # The time of a step is computed from the differences between the times of these calls.
 
@@ -254,7 +254,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # This line calls no function, so its time is the time of the loop.
+        "q",  # This line calls no function, so the measured time is the time of the loop.
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
         "empty(shape)",
