@@ -1,6 +1,6 @@
-"""Derive the Denavit-Hartenberg table of a URDF, and print it like a data sheet.
+"""Derive the Denavit-Hartenberg table of a URDF, and print the table as Markdown.
 
-You learn that `snap` rounds an angle of 1.5708 in the URDF to a right angle, and that every table is compared
+You learn that `snap` rounds an angle of 1.5708 in the URDF to a right angle. urdfkin compares every table
 with Pinocchio.
 """
 

@@ -1,7 +1,7 @@
 """Use mimic joints: a finger that mimics another one has no coordinate.
 
-You learn that `q` contains no mimic joints, that a mimic joint's motion is part of the mimicked joint's
-column, and that `mimic=False` makes mimic joints free.
+You learn that `q` contains no mimic joints. The Jacobian's column of the mimicked joint includes the motion
+of the mimic joint. `mimic=False` makes mimic joints free.
 """
 
 import numpy as np

@@ -159,8 +159,8 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
     document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
     texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}
-    for place, text in texts.items():
-        (folder / place).write_text(text, encoding="utf-8")
+    for file_name, text in texts.items():
+        (folder / file_name).write_text(text, encoding="utf-8")
     yield (page := Page("fleet", (folder / "fleet.html").as_uri()))
     yield Page("fleet-text", (folder / "fleet-text.html").as_uri())
     for i, robot in enumerate(document["robots"]):
@@ -183,16 +183,16 @@ def site_pages(folder: Path) -> Iterator[Page]:
         yield Page(f"site-{name.replace('/', '-')}", url, printed=False)
 
 
-def iter_pages(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
+def iter_pages(folder: Path, is_selected: Callable[[str], bool]) -> Iterator[Page]:
     for name, make in report_makers(folder).items():
-        if wanted(name):
+        if is_selected(name):
             path = folder / f"{name}.html"
             path.write_text(make(), encoding="utf-8")
             yield Page(name, path.as_uri())
             if name in ("good", "disagreement"):
                 yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
     for name, pages in (("fleet", fleet_pages), ("site", site_pages)):
-        if wanted(name):
+        if is_selected(name):
             yield from pages(folder)
 
 
@@ -230,7 +230,7 @@ def open_page(browser: Browser, page: Page) -> None:
 def check_screen(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
-    where, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
+    screen, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
     browser.errors()
@@ -243,11 +243,11 @@ def check_screen(
         browser.js(axe)
         browser.chrome.set_script_timeout(_AXE_SECONDS)
         for impact, rule, count, nodes in browser.chrome.execute_async_script(_AXE):
-            what = f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
+            fault = f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
             if impact in IMPACTS:
-                faults.append(what)
+                faults.append(fault)
             else:
-                print(f"  note {where}: {what[:300]}", flush=True)
+                print(f"  note {screen}: {fault[:300]}", flush=True)
     faults += [
         f"table {name}: {inner} pixels wide, but its box has {room}" for name, inner, room in browser.js(_CUT)
     ]
@@ -260,8 +260,8 @@ def check_screen(
         height = browser.js("return document.documentElement.scrollHeight")
         browser.become(width, min(6000, height), dark=dark)
         browser.settle()
-        browser.chrome.save_screenshot(str(output / f"{page.name}-{where.replace(' ', '-')}.png"))
-    return [f"{page.name}, {where}: {what}" for what in dict.fromkeys(faults)]
+        browser.chrome.save_screenshot(str(output / f"{page.name}-{screen.replace(' ', '-')}.png"))
+    return [f"{page.name}, {screen}: {fault}" for fault in dict.fromkeys(faults)]
 
 
 def check_keyboard(browser: Browser, page: Page) -> list[str]:
@@ -273,18 +273,18 @@ def check_keyboard(browser: Browser, page: Page) -> list[str]:
         stop = browser.js(_FOCUS)
         if stop is None:  # The Tab key moved the focus out of the page.
             break
-        what, shown, sized, named = stop
-        seen.append(what)
-        if not shown and sized and not browser.chrome.execute_async_script(_BORDER):
-            faults.append(f"no visible focus on {what}")
-        if not named:
-            faults.append(f"no name of {what}")
+        element, is_marked, has_area, has_name = stop
+        seen.append(element)
+        if not is_marked and has_area and not browser.chrome.execute_async_script(_BORDER):
+            faults.append(f"no visible focus on {element}")
+        if not has_name:
+            faults.append(f"no name of {element}")
         if len(seen) > 5 and len(set(seen[-5:])) == 1 and not seen[-1].startswith(("input", "button")):
-            faults.append(f"the focus stays on {what}")
+            faults.append(f"the focus stays on {element}")
             break
     if not seen and browser.js("return document.querySelectorAll('a, button, input, [tabindex]').length"):
         faults.append("the Tab key reaches nothing")
-    return [f"{page.name}, keyboard: {what}" for what in dict.fromkeys(faults)]
+    return [f"{page.name}, keyboard: {fault}" for fault in dict.fromkeys(faults)]
 
 
 def find_html_errors(page: Page, jar: Path) -> list[str]:
@@ -346,9 +346,9 @@ def main() -> None:
         # The site stores the theme of the first visit, so the stored theme is removed before each page.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
-        found = audit(browser, page, arguments.output, axe, jar)
-        faults.extend(found)
-        print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
+        page_faults = audit(browser, page, arguments.output, axe, jar)
+        faults.extend(page_faults)
+        print(f"{page.name}: {len(page_faults)} faults", *page_faults, sep="\n  ", flush=True)
 
     with tempfile.TemporaryDirectory() as folder:
         with opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser:

@@ -42,7 +42,7 @@ class BenchmarkSize:
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # number of values in a chain's batch of Jacobians
+    numbers: int = 4_000_000  # approximate number of values in all Jacobians of a batch
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
     frame_configurations: int = 4_000  # number of configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
@@ -53,18 +53,18 @@ QUICK = BenchmarkSize(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100,
 
 
 def measure_sections(
-    plan: BenchmarkSize, sections: Sequence[str], contenders: Sequence[Contender]
+    size: BenchmarkSize, sections: Sequence[str], contenders: Sequence[Contender]
 ) -> dict[str, Any]:
     """Measure everything; raise DifferenceError if two libraries have different results."""
     name, frame = ROBOT_FRAMES[0]
-    n, rounds = plan.configurations, plan.rounds
+    n, rounds = size.configurations, size.rounds
     rows: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
         **{name: measured.contender_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
-        "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
-        "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),
-        "sizes": measured.size_rows(plan.sizes, rounds),
+        "joints": measured.joint_rows(size.joints, size.numbers, rounds),
+        "frames": measured.frame_rows(size.frame_configurations, size.frames, rounds),
+        "sizes": measured.size_rows(size.sizes, rounds),
     }
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "machine": describe_machine(),
         "versions": versions(),
         "libraries": {contender.library: contender.version for contender in contenders},
@@ -77,16 +77,16 @@ def measure_sections(
             for row in section_rows
         ],
         "memory": [
-            measure_memory(name, frame, quantity, plan.memory, out=out)
+            measure_memory(name, frame, quantity, size.memory, out=out)
             for quantity, out in product(QUANTITIES, (True, False) if "memory" in sections else ())
         ],
     }
     if "where" in sections:
         single = measured.call_step_times(min(n, 2_000), rounds)
-        found["where"] = [*measured.batch_step_times(n, rounds), *single]
+        figures["where"] = [*measured.batch_step_times(n, rounds), *single]
     if "first" in sections:
-        found["first"] = list(measure_first_uses(name, frame, plan.first))
-    return found
+        figures["first"] = list(measure_first_uses(name, frame, size.first))
+    return figures
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -4,8 +4,9 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The share of the memory's bandwidth is the data rate of the code, divided by the
-data rate of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
+median of several launches. The last column is the data rate of the code, as a fraction of the bandwidth of
+the GPU's memory. The bandwidth is the data rate of a copy within this memory. A data rate counts the bytes
+that are read and written.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
 `torch.compile`. If PyTorch Kinematics is installed too, the program also measures this library's Jacobian.
@@ -44,8 +45,9 @@ from urdfkin.export.forms import make_robot_code
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
 
-#: Sizes of batches, and the number of measured launches of each.
+#: Batch sizes: the number of configurations in each batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
+#: Number of timed launches for each quantity, precision and batch size.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
 #: Largest allowed error of PyTorch Kinematics' Jacobian; this library reads angles in single precision.
@@ -106,24 +108,24 @@ def compile_programs(code: FrameCode, folder: Path, compiler: str) -> dict[str, 
     libraries = Path(compiler).resolve().parents[1] / "lib"
     arch = ["-arch=native"] if count_gpus() else []
     command = [compiler, "-O3", "-std=c++17", *arch, f"-I{folder}", f"-L{libraries}", "-x", "cu"]
-    up, found = code.name.upper(), {"measure": folder / "measure"}
-    subprocess.run([*command, str(source), "-o", str(found["measure"])], check=True)
+    up, programs = code.name.upper(), {"measure": folder / "measure"}
+    subprocess.run([*command, str(source), "-o", str(programs["measure"])], check=True)
     for real in _BYTES:
-        found[real] = folder / f"check_{real}"
+        programs[real] = folder / f"check_{real}"
         macros = [f"-D{up}_MAIN", f"-D{up}_REAL={real}"]
-        subprocess.run([*command, *macros, str(header), "-o", str(found[real])], check=True)
-    return found
+        subprocess.run([*command, *macros, str(header), "-o", str(programs[real])], check=True)
+    return programs
 
 
 def make_rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
-    found = [json.loads(line) for line in lines]
-    if not found or "bandwidth" not in found[0]:
+    records = [json.loads(line) for line in lines]
+    if not records or "bandwidth" not in records[0]:
         raise ValueError("the compiled program did not print the bandwidth of the GPU's memory")
     functions = {f.name: f for f in code.functions}
-    for row in found[1:]:
+    for row in records[1:]:
         a_second = row["n"] / row["s"]
-        moved = bytes_per_configuration(code, functions[row["quantity"]], row["real"])
-        yield {**row, "a_second": a_second, "share": a_second * moved / found[0]["bandwidth"]}
+        byte_count = bytes_per_configuration(code, functions[row["quantity"]], row["real"])
+        yield {**row, "a_second": a_second, "share": a_second * byte_count / records[0]["bandwidth"]}
 
 
 def make_table(measured: Iterable[dict[str, Any]]) -> str:
@@ -161,14 +163,14 @@ def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda
                 "call": callables[by],
                 "inputs": [torch.rand((n, width), **kind) for width in code.widths(function).values()],
             }
-            found = Timer("call(*inputs)", globals=names).blocked_autorange().median
-            yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": found})
+            seconds = Timer("call(*inputs)", globals=names).blocked_autorange().median
+            yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": seconds})
 
 
 def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
 
-    Raise ValueError if its Jacobian differs from the Jacobian that `robot` computes.
+    Raise ValueError if the Jacobians of PyTorch Kinematics and urdfkin differ.
     """
     import pytorch_kinematics
     import torch
@@ -181,8 +183,8 @@ def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Calla
     for real, most in _MOST.items():
         kind = getattr(torch, real)
         chains[kind] = copy.deepcopy(chain).to(dtype=kind, device=device)
-        found = chains[kind].jacobian(torch.tensor(q[:, columns], dtype=kind, device=device))
-        if not np.abs(found.cpu().numpy() - robot.jacobian(q, frame)[..., columns]).max() <= most:
+        J = chains[kind].jacobian(torch.tensor(q[:, columns], dtype=kind, device=device))
+        if not np.abs(J.cpu().numpy() - robot.jacobian(q, frame)[..., columns]).max() <= most:
             raise ValueError(f"PyTorch Kinematics computes a wrong Jacobian in {real} precision")
     return lambda q: chains[q.dtype].jacobian(q[:, columns])
 
@@ -213,17 +215,19 @@ def main(words: list[str] | None = None) -> int:
             print(f"compiled, not run: {', '.join(programs)}")
             return 0
         for real in _BYTES:
-            done = subprocess.run([str(programs[real])], capture_output=True, text=True, check=False)
-            print(done.stdout, end="")
-            if done.returncode or done.stdout.count(" on the GPU") != len(code.functions):
-                return _report_failure(f"the check in {real} precision failed on the GPU: {done.stderr}", 1)
+            process = subprocess.run([str(programs[real])], capture_output=True, text=True, check=False)
+            print(process.stdout, end="")
+            if process.returncode or process.stdout.count(" on the GPU") != len(code.functions):
+                return _report_failure(
+                    f"the check in {real} precision failed on the GPU: {process.stderr}", 1
+                )
         lines = subprocess.run([str(programs["measure"])], capture_output=True, text=True, check=True).stdout
-    found, status = lines.splitlines(), 0
+    records, status = lines.splitlines(), 0
     try:
-        found.extend(measure_torch(robot, frame, code))
+        records.extend(measure_torch(robot, frame, code))
     except ValueError as error:
         status = _report_failure(str(error), 1)
-    measured = list(make_rows(code, found))
+    measured = list(make_rows(code, records))
     print(make_table(measured))
     if options.json:
         options.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")

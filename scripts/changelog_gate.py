@@ -55,8 +55,8 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
         print(f"changelog not checked: {error}")
         return 0
     # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
-    found = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
-    changed = {path for added, deleted, path in found if (added, deleted) != ("0", "0")}
+    changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
+    changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))
     if not package or PAGE in changed or _NO_CHANGELOG.search(messages):
         return 0

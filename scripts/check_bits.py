@@ -90,8 +90,8 @@ class RobotInputs:
         threads: int | None = None,
     ) -> FloatArray:
         words = (frame, reference) if quantity.has_reference else (frame,)
-        how = {} if threads is None else {"threads": threads}
-        result: FloatArray = getattr(self.robot, quantity.method)(*inputs, *words, verify=False, **how)
+        options = {} if threads is None else {"threads": threads}
+        result: FloatArray = getattr(self.robot, quantity.method)(*inputs, *words, verify=False, **options)
         return result
 
 
@@ -102,28 +102,30 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
     """Yield results of batches and prepared evaluators that differ from single calls."""
     frame = subject.frames[0]
-    for what, quantity, reference, inputs in subject.calls():
-        few = [x[:STORED] for x in inputs]
-        if not have_equal_bits(subject.compute(quantity, reference, subject.frames, few), now[what]):
-            yield f"{what}: several frames in one pass"
+    for call_name, quantity, reference, inputs in subject.calls():
+        stored_inputs = [x[:STORED] for x in inputs]
+        if not have_equal_bits(
+            subject.compute(quantity, reference, subject.frames, stored_inputs), now[call_name]
+        ):
+            yield f"{call_name}: several frames in one pass"
         rows = list(zip(*inputs, strict=True))
         single = np.stack([subject.compute(quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
-            yield f"{what}: a result is not finite"
+            yield f"{call_name}: a result is not finite"
         fast = getattr(subject.robot.prepare(frame, reference), quantity.method, None)
         if fast is not None:
             out = np.empty_like(single)
-            for row, place in zip(rows, out, strict=True):
-                fast(*row, out=place)
+            for row, out_row in zip(rows, out, strict=True):
+                fast(*row, out=out_row)
             if not have_equal_bits(single, out):
-                yield f"{what}: prepared"
+                yield f"{call_name}: prepared"
         for n, threads in product(LENGTHS, THREADS):
             for first in {0, min(5, len(rows) - n)}:
                 part = [x[first : first + n] for x in inputs]
                 batch = subject.compute(quantity, reference, frame, part, threads)
                 for k in range(n):
                     if not have_equal_bits(batch[k], single[first + k]):
-                        yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
+                        yield f"{call_name}: row {k} of {n} from {first} on, threads={threads}"
 
 
 def find_interpreted_differences(subject: RobotInputs) -> Iterator[str]:
@@ -197,12 +199,17 @@ def main(words: Sequence[str] | None = None) -> int:
         subject = RobotInputs.load(name, before)
         with use_only("compiled"):
             now = compute_stored_results(subject)
-            found = list(find_differences(subject, now))
-        found += find_interpreted_differences(subject)
+            differences = list(find_differences(subject, now))
+        differences += find_interpreted_differences(subject)
         everything |= now
-        said, most = ("", 0.0) if before is None else compare_with_stored(name, now, before)
-        print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
-        wrong += bool(found) or most > options.within
+        summary, most = ("", 0.0) if before is None else compare_with_stored(name, now, before)
+        print(
+            f"{name:28} {digest(now)} {summary}",
+            *differences[:3],
+            sep="\n    " if differences else " ",
+            flush=True,
+        )
+        wrong += bool(differences) or most > options.within
     print(f"{'all robots':28} {digest(everything)} {wrong} wrong")
     if options.write is not None:
         np.savez_compressed(options.write, **everything)

@@ -12,11 +12,12 @@
 `--package torch==2.13.0+cpu` chooses the version. `scripts/run_exported.py` describes the checks.
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
-compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
-configuration and in batches. The Python code runs with NumPy, and with NumPy as an array API namespace, in
-both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed random order, so that a
-stopped run has checked a random sample. Exit 1: a number is outside its bound, or a compiler prints a
-warning.
+compared with results at fifty digits. GCC and Clang compile the C code; a missing compiler is skipped. The
+compiled programs compute single configurations and batches. The Python code runs with NumPy, and with NumPy
+as an array API namespace, in both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed
+random order, so that a stopped run has checked a random sample.
+
+Exit 1: an error exceeds its bound, a function is not verified, or a compiler prints a warning.
 """
 
 import argparse
@@ -50,7 +51,8 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: A PyTorch or JAX file contains a Hessian up to this number of joint velocities, because the check is slow.
+#: Maximum number of joint velocities of a robot whose PyTorch or JAX file contains a Hessian.
+#: The check of a larger Hessian is slow.
 #: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
@@ -60,34 +62,34 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) 
     return make_robot_code(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
-def error_ratios(written: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Yield the name of each compiled or Python program, and the largest error as a fraction of its bound."""
+def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
+    """Yield the name of each compiled or Python program, and its largest ratio of an error to a bound."""
     for to, suffix, compilers, strict in _COMPILED:
-        source, name = folder / f"robot{suffix}", written.name.upper()
+        source, name = folder / f"robot{suffix}", code.name.upper()
         for compiler in filter(shutil.which, compilers if to in languages else ()):
-            source.write_text(write(written, to), encoding="utf-8")
+            source.write_text(write(code, to), encoding="utf-8")
             for real in ("double", "float"):
                 program = folder / f"{compiler}_{real}"
                 macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
                 command = [compiler, *strict, *macros, str(source), "-o", str(program), "-lm"]
                 subprocess.run(command, check=True)
-                done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
-                found = [float(share) for share in _ERROR_RATIO.findall(done.stdout)]
-                yield f"{compiler} {real}", _largest_ratio(found, len(written.functions))
+                process = subprocess.run([str(program)], capture_output=True, text=True, check=False)
+                ratios = [float(share) for share in _ERROR_RATIO.findall(process.stdout)]
+                yield f"{compiler} {real}", _largest_ratio(ratios, len(code.functions))
     for to in sorted({"numpy", "array", "sympy-exact"} & set(languages)):
         scope: dict[str, Any] = {"__name__": "robot"}
-        own = code_in(written, to)
-        if not own.proof.certificate.verified:
+        language_code = code_in(code, to)
+        if not language_code.proof.certificate.verified:
             yield f"{to} unverified", float("nan")
-        exec(compile(write(own, to), "robot.py", "exec"), scope)
+        exec(compile(write(language_code, to), "robot.py", "exec"), scope)
         checked: dict[tuple[str, str], float] = scope["check"]()
         for kind in {kind for _, kind in checked}:
-            found = [share for (_, of), share in checked.items() if of == kind]
-            yield f"{to} {kind}", _largest_ratio(found, len(written.functions))
+            ratios = [share for (_, of), share in checked.items() if of == kind]
+            yield f"{to} {kind}", _largest_ratio(ratios, len(code.functions))
 
 
 def _largest_ratio(found: Sequence[float], count: int) -> float:
-    """Return the largest ratio of an error to its bound; NaN if one is NaN or one is missing."""
+    """Return the largest error ratio, or NaN if a ratio is NaN or there are not `count` ratios."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
@@ -108,10 +110,10 @@ def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 def check_frame(robot: Robot, frame: str, languages: Collection[str]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
-        written = make_code(robot, frame, QUANTITIES if robot.nv else ("placement",))
-        found = dict(error_ratios(written, Path(folder), languages))
-    good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
-    return {"good": good, **found}
+        code = make_code(robot, frame, QUANTITIES if robot.nv else ("placement",))
+        ratios = dict(error_ratios(code, Path(folder), languages))
+    good = all(share <= 1.0 for share in ratios.values()) and code.proof.certificate.verified
+    return {"good": good, **ratios}
 
 
 def check_leaves(tips: bool, keep: Path | None, languages: Collection[str]) -> int:
@@ -124,11 +126,11 @@ def check_leaves(tips: bool, keep: Path | None, languages: Collection[str]) -> i
     wrong = [line for line in lines if not line["good"]]
     for line in wrong:
         print("WRONG", line)
-    found = {(line["robot"], line["frame"]) for line in lines}
+    checked_frames = {(line["robot"], line["frame"]) for line in lines}
     trees = {name: urdfkin.load(name).tree for name in example_robots()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
-    counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
-    others = f"{len(found - leaves)} tips that are not leaves"
+    counts = f"{len(checked_frames & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
+    others = f"{len(checked_frames - leaves)} tips that are not leaves"
     print(f"{counts}, {others}; {len(wrong)} outside the bound or unverified")
     print_worst_errors(lines)
     return bool(wrong)
@@ -158,15 +160,18 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _write_files(library: str, folder: Path) -> Iterator[Path]:
-    """Yield files with the code of each robot's tip frame, in a library's format and in `array`."""
+    """Write code for the tip frame of each robot, and yield the path of each file.
+
+    Each tip frame gets two files: one in the library's format, and one in the format `array`.
+    """
     for number, (_, robot, frame) in enumerate(leaf_frames(tips=True)):
-        wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
+        quantities = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
         for to in (library, "array"):
             hessian = differentiable and (robot.nv <= _MAX_HESSIAN if to == library else library == "torch")
-            written = make_code(robot, frame, (*wanted, "hessian") if hessian else wanted)
-            path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
-            path.write_text(write(written, to), encoding="utf-8")
+            code = make_code(robot, frame, (*quantities, "hessian") if hessian else quantities)
+            path = folder / f"{code.name}_{number}{LANGUAGES[to][1]}"
+            path.write_text(write(code, to), encoding="utf-8")
             yield path
 
 
@@ -194,10 +199,10 @@ def make_page(text: str) -> str:
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
     for (source, frame), quantity in product(frames, QUANTITIES):
         robot = urdfkin.load(source)
-        written = make_code(robot, frame, (quantity,))
-        lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
+        code = make_code(robot, frame, (quantity,))
+        lines = write(code, "c").partition("#ifdef " + code.name.upper() + "_MAIN")[0]
         sizes = (
-            f"{written.functions[0].operation_count:,}",
+            f"{code.functions[0].operation_count:,}",
             f"{lines.count(chr(10)):,}",
             f"{len(lines) / 1000:.0f}",
         )
@@ -209,7 +214,11 @@ def make_page(text: str) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
-    option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")
+    option(
+        "--keep",
+        type=Path,
+        help="file for the results, one per line; checks in this file are not repeated",
+    )
     option("--tips", action="store_true", help="check only one leaf link of each robot")
     option("--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md")
     option(

@@ -98,19 +98,19 @@ def run_in_other_python(form: str, interpreter: str, jobs: Sequence[Job], folder
 
 
 def run_in_c(jobs: Sequence[Job], folder: Path) -> Poses:
-    compiler, found = _find_program("cc"), Poses()
+    compiler, results = _find_program("cc"), Poses()
     for k, job in enumerate(jobs):
         text, library = export(job.table, "c"), folder / f"code{k}.so"
         name = re.findall(r"^void (\w+_placement)\(", text, re.MULTILINE)[0]
         (folder / "code.c").write_text(text, "utf-8")
         command = [compiler, *_STRICT, "-shared", "-fPIC", "code.c", "-o", str(library), "-lm"]
         subprocess.run(command, cwd=folder, check=True)
-        place = ctypes.CDLL(str(library))[name]
-        given, T = np.array(job.coordinates("c")), np.empty((len(job.q), 4, 4))
-        for q, out in zip(given, T, strict=True):
-            place(ctypes.c_void_p(q.ctypes.data), ctypes.c_void_p(out.ctypes.data))
-        found.append(T)
-    return found
+        function = ctypes.CDLL(str(library))[name]
+        configurations, T = np.array(job.coordinates("c")), np.empty((len(job.q), 4, 4))
+        for q, out in zip(configurations, T, strict=True):
+            function(ctypes.c_void_p(q.ctypes.data), ctypes.c_void_p(out.ctypes.data))
+        results.append(T)
+    return results
 
 
 def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
@@ -132,11 +132,11 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
         lines.append("printf('end\\n');")
     (folder / "tables.m").write_text("\n".join(lines), "utf-8")
     command = [octave, "--no-init-file", "--quiet", "tables.m"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-    if done.stdout.startswith("missing"):
+    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
     # Octave's package also prints the version of Python that it found.
-    parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
+    parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
 
@@ -173,16 +173,18 @@ RUN: dict[str, Run] = {
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
     """Return the excess width (points) of each LaTeX table on the page of an `article`."""
     latex = _find_program("pdflatex")
-    marked = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
-    (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked) + "\\end{document}\n", "utf-8")
+    marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
+    (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
     command = [latex, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
-    if done.returncode:
-        raise RuntimeError(next(line for line in done.stdout.splitlines() if line.startswith("!")))
+    process = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+    )
+    if process.returncode:
+        raise RuntimeError(next(line for line in process.stdout.splitlines() if line.startswith("!")))
     log = (folder / "tables.log").read_text("utf-8", errors="replace")
     parts = re.split(r"^table \d+$", log, flags=re.MULTILINE)[1:]
-    over = (re.findall(r"Overfull \\hbox \((\S+)pt too wide\)", part) for part in parts)
-    return [max(map(float, found), default=0.0) for found in over]
+    excesses = (re.findall(r"Overfull \\hbox \((\S+)pt too wide\)", part) for part in parts)
+    return [max(map(float, widths), default=0.0) for widths in excesses]
 
 
 def _find_program(name: str) -> str:
@@ -252,7 +254,7 @@ def main(words: Sequence[str] | None = None) -> int:
         RUN.update(
             {form: partial(run_in_other_python, form, options.toolbox) for form in ("roboticstoolbox", "ets")}
         )
-    found = list(make_cases(options.leaves))
+    cases = list(make_cases(options.leaves))
     heads = ("form", "tables", "refused", "from Pinocchio at most", "of the bound", "seconds")
     print(markdown(heads, [], left=1), flush=True)
     wrong = 0
@@ -261,7 +263,7 @@ def main(words: Sequence[str] | None = None) -> int:
         with tempfile.TemporaryDirectory() as folder:
             try:
                 cells, faults = (_check_widths if form == "latex" else _compare_form)(
-                    form, found, Path(folder)
+                    form, cases, Path(folder)
                 )
             except MissingProgramError as error:
                 cells, faults = [f"not run: {error} is missing", "", "", ""], []
@@ -271,23 +273,24 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(wrong > 0)
 
 
-def _compare_form(form: str, found: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
-    taken = [one for one in found if form not in FORMATS or can_represent(form, one.table)]
+def _compare_form(form: str, cases: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
+    selected = [case for case in cases if form not in FORMATS or can_represent(form, case.table)]
     if form == "matlab-symbolic":
-        taken = [one for one in taken if 0 < len(one.table.rows) <= MAX_SYMBOLIC_ROWS][:MAX_SYMBOLIC_TABLES]
+        selected = [case for case in selected if 0 < len(case.table.rows) <= MAX_SYMBOLIC_ROWS]
+        selected = selected[:MAX_SYMBOLIC_TABLES]
     figures = [
-        one.measure_errors(pose)
-        for one, pose in zip(taken, RUN[form]([one.job for one in taken], folder), strict=True)
+        case.measure_errors(pose)
+        for case, pose in zip(selected, RUN[form]([case.job for case in selected], folder), strict=True)
     ]
-    wrong = [one.name for one, (_, share) in zip(taken, figures, strict=True) if not share <= 1.0]
+    wrong = [case.name for case, (_, share) in zip(selected, figures, strict=True) if not share <= 1.0]
     metres, share = map(max, zip(*figures, strict=True))
-    return [str(len(taken)), str(len(found) - len(taken)), f"{metres:.1e} m", f"{share:.0%}"], wrong
+    return [str(len(selected)), str(len(cases) - len(selected)), f"{metres:.1e} m", f"{share:.0%}"], wrong
 
 
-def _check_widths(form: str, found: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
-    over = measure_excess_widths([export(one.table, form) for one in found], folder)
-    wide = [f"{one.name} is {x} pt too wide" for one, x in zip(found, over, strict=True) if x]
-    return [str(len(found)), "0", f"{len(wide)} wider than the page", ""], wide
+def _check_widths(form: str, cases: Sequence[Case], folder: Path) -> tuple[list[str], list[str]]:
+    excesses = measure_excess_widths([export(case.table, form) for case in cases], folder)
+    wide = [f"{case.name} is {x} pt too wide" for case, x in zip(cases, excesses, strict=True) if x]
+    return [str(len(cases)), "0", f"{len(wide)} wider than the page", ""], wide
 
 
 if __name__ == "__main__":

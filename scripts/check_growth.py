@@ -6,9 +6,10 @@
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
 check takes longer than `--patience`, the script does not check larger documents of the same kind.
 
-For each kind of content, a function returns a URDF of about a given size (bytes), which repeats this content.
-A faulty exporter or an attacker could write such files. urdfkin rejects most of these files. The time and
-memory of the rejection must be proportional to the size of the file.
+For each kind of content, a function returns a URDF that repeats this content. The function's argument is the
+approximate size of the URDF in bytes. A faulty exporter or an attacker could write such files. urdfkin
+rejects most of these files. The time and memory of the rejection must be proportional to the size of the
+file.
 """
 
 import argparse
@@ -162,7 +163,10 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time and the growth of memory, findings included, for each MB of a document."""
+    """Return the processor time and the growth of memory for each MB of a document.
+
+    The memory includes the findings.
+    """
 
     def read_usage() -> tuple[float, float]:
         return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

@@ -37,48 +37,58 @@ from urdfkin.urdf.catalogue import catalogue
 ROUNDING = 1e-10
 
 
-def check_pair(name: str, what: str) -> dict[str, Any] | None:
+def check_pair(name: str, change: str) -> dict[str, Any] | None:
     """Check one change of one robot; return None if the change is impossible."""
-    a, b = robot(name), changed(name, what)
+    a, b = robot(name), changed(name, change)
     if b is None:
         return None
     began = time.process_time()
-    found = urdfkin.same(a, b, bounds=what in UNLIKE)
+    comparison = urdfkin.same(a, b, bounds=change in UNLIKE)
     seconds = round(time.process_time() - began, 2)
-    result = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
-    if what in ALIKE:
-        return result | {"right": bool(found) and moves_alike(found, a, b, ROUNDING)}
+    result = {"robot": name, "change": change, "verdict": comparison.verdict.value, "seconds": seconds}
+    if change in ALIKE:
+        return result | {"right": bool(comparison) and moves_alike(comparison, a, b, ROUNDING)}
     # Rounding to four digits leaves some files unchanged. Every verdict is then accepted.
-    result["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
-    tools = {tool.b for tool in found.tools}
-    frames = [frame for frame in found.frames if frame.frame_b not in tools and frame.q_a]
+    result["right"] = comparison.verdict is Verdict.DIFFERS or change == "rounded"
+    tools = {tool.b for tool in comparison.tools}
+    frames = [frame for frame in comparison.frames if frame.frame_b not in tools and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
-    if worst is None or not math.isfinite(worst.upper) or not np.array_equal(found.base, np.eye(4)):
+    if worst is None or not math.isfinite(worst.upper) or not np.array_equal(comparison.base, np.eye(4)):
         return result
     attained = far(a, b, np.array(worst.q_a), np.array(worst.q_b), worst)
-    truth = max(attained, searched(a, b, found.to_b, worst))
+    truth = max(attained, searched(a, b, comparison.to_b, worst))
     result |= {"frame": worst.frame, "lower": worst.lower, "upper": worst.upper, "truth": truth}
     return result | {"holds": worst.lower <= attained and truth <= worst.upper}
 
 
-def summarize(some: list[dict[str, Any]]) -> Iterator[str]:
-    wrong = [one for one in some if not one["right"]]
-    bounded = [one for one in some if "holds" in one]
-    missed = [one for one in bounded if not one["holds"]]
-    robots = len({one["robot"] for one in some})
-    yield f"{len(some) - len(wrong)} of {len(some)} verdicts right, {robots} robots"
+def summarize(results: list[dict[str, Any]]) -> Iterator[str]:
+    wrong = [result for result in results if not result["right"]]
+    bounded = [result for result in results if "holds" in result]
+    missed = [result for result in bounded if not result["holds"]]
+    robots = len({result["robot"] for result in results})
+    yield f"{len(results) - len(wrong)} of {len(results)} verdicts right, {robots} robots"
     yield f"{len(bounded) - len(missed)} of {len(bounded)} intervals contain the result of the search"
-    for what in UNLIKE:
-        widths = [one["upper"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
-        found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
-        if widths:
-            above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (largest)"
-            yield f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
-            yield f"  the lower bound at most {1 - min(found):.1%} below"
-    seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
+    for change in UNLIKE:
+        upper_ratios = [
+            result["upper"] / result["truth"]
+            for result in bounded
+            if result["change"] == change and result["truth"]
+        ]
+        lower_ratios = [
+            result["lower"] / result["truth"]
+            for result in bounded
+            if result["change"] == change and result["truth"]
+        ]
+        if upper_ratios:
+            above = (
+                f"{statistics.median(upper_ratios) - 1:.1%} (median), {max(upper_ratios) - 1:.1%} (largest)"
+            )
+            yield f"{change}: {len(upper_ratios)}; the upper bound is {above} above the result of the search,"
+            yield f"  the lower bound at most {1 - min(lower_ratios):.1%} below"
+    seconds = [result["seconds"] for result in results if result["change"] in UNLIKE]
     if seconds:
         yield f"seconds with bounds: median {statistics.median(seconds):.1f}, largest {max(seconds):.1f}"
-    yield from (f"WRONG: {json.dumps(one)}" for one in (*wrong, *missed))
+    yield from (f"WRONG: {json.dumps(result)}" for result in (*wrong, *missed))
 
 
 if __name__ == "__main__":
@@ -88,12 +98,13 @@ if __name__ == "__main__":
     options = parser.parse_args()
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     lines = options.keep.read_text().splitlines() if options.keep.exists() else []
-    some = [json.loads(line) for line in lines]
-    known = {(one["robot"], one["change"]) for one in some}
-    for name, what in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
-        if (name, what) not in known and (one := check_pair(name, what)) is not None:
-            some.append(one)
+    results = [json.loads(line) for line in lines]
+    known = {(result["robot"], result["change"]) for result in results}
+    for name, change in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
+        if (name, change) not in known and (result := check_pair(name, change)) is not None:
+            results.append(result)
             with options.keep.open("a") as file:
-                print(json.dumps(one), file=file)
-    print(*summarize([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
-    sys.exit(any(not one["right"] or not one.get("holds", True) for one in some))
+                print(json.dumps(result), file=file)
+    selected = [result for result in results if not options.robots or result["robot"] in options.robots]
+    print(*summarize(selected), sep="\n")
+    sys.exit(any(not result["right"] or not result.get("holds", True) for result in results))

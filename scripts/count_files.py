@@ -25,7 +25,7 @@ A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
 
 def files_run(call: Callable[[], object]) -> list[str]:
     """Return the files of urdfkin whose functions run during a call."""
-    found: set[str] = set()
+    file_names: set[str] = set()
     importing = 0
 
     def profile(frame: FrameType, event: str, _: object) -> None:
@@ -34,14 +34,14 @@ def files_run(call: Callable[[], object]) -> list[str]:
         if code.co_name == "<module>":
             importing += (event == "call") - (event == "return")
         elif event == "call" and not importing:
-            found.add(code.co_filename)
+            file_names.add(code.co_filename)
 
     sys.setprofile(profile)
     try:
         call()
     finally:
         sys.setprofile(None)
-    inside = (Path(file) for file in found if Path(file).is_relative_to(ROOT))
+    inside = (Path(file) for file in file_names if Path(file).is_relative_to(ROOT))
     return sorted(path.relative_to(ROOT).as_posix() for path in inside)
 
 

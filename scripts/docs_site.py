@@ -44,7 +44,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/trajectories.md": (
         "Trajectories",
-        "Samples of a log, and the motion of a frame along them, compared with Pinocchio.",
+        "Read trajectories, and compute a frame's motion along a trajectory. Pinocchio checks each sample.",
         "read_trajectory frame_motion urdfkin.robot.trajectory.Trajectory "
         "urdfkin.robot.frame_motion.FrameMotion",
     ),
@@ -130,14 +130,14 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 def on_page_content(content: str, **_: Any) -> str:
     from latex2mathml.converter import convert
 
-    def convert_formula(found: re.Match[str]) -> str:
-        alone = found[0].startswith("<p>") and found[0].endswith("</p>")
-        text = str(convert(html.unescape(found[1]), display="block" if alone else "inline"))
+    def convert_formula(match: re.Match[str]) -> str:
+        alone = match[0].startswith("<p>") and match[0].endswith("</p>")
+        text = str(convert(html.unescape(match[1]), display="block" if alone else "inline"))
         text = text.replace("<mover>", '<mover accent="true">')
         text = _NAME_OF_FUNCTION.sub(r'\1<mspace width="0.17em"/>', text)
         if alone:
             return f'<div class="formula">{text}</div>'
-        return found[0].replace(f"$<code>{found[1]}</code>$", text)
+        return match[0].replace(f"$<code>{match[1]}</code>$", text)
 
     return _FORMULA.sub(convert_formula, content)
 
@@ -150,17 +150,17 @@ def on_post_page(output: str, **_: Any) -> str:
 
 def make_notebook(page: str) -> dict[str, Any]:
     cells: list[dict[str, Any]] = []
-    at = 0
+    position = 0
     for block in _FENCE.finditer(page):
         kind, text = block.groups()
         if kind == "python" or (kind == "text" and cells and cells[-1]["cell_type"] == "code"):
-            _add_text(cells, page[at : block.start()])
-            at = block.end()
+            _add_text(cells, page[position : block.start()])
+            position = block.end()
         if kind == "python":
             cells.append(_make_cell("code", text, execution_count=None, outputs=[]))
-        elif kind == "text" and at == block.end():
+        elif kind == "text" and position == block.end():
             cells[-1]["outputs"].append({"output_type": "stream", "name": "stdout", "text": text})
-    _add_text(cells, page[at:])
+    _add_text(cells, page[position:])
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
     return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 4}
 
@@ -192,7 +192,7 @@ def make_subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # The page of a method's subject documents the method, so the entry of `Robot` lists no methods.
+        # Other entries of `LIBRARY` document the methods, so the entry of the class `Robot` lists no methods.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {find_address(name)}\n    options:\n{lines}")

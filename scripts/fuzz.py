@@ -61,14 +61,17 @@ def make_case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one document after another, and may crash."""
+    """A process that tests one case after another. A case can crash the process."""
 
     def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
         self.work, self.timeout = work, timeout
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a document; return the outcome and its details; a crash or a timeout is also an outcome."""
+        """Test a case, and return the result and details.
+
+        A crash or a timeout of the process is a result too.
+        """
         if self.process is None:
             self.start()
         try:
@@ -101,7 +104,10 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Receive the family and number of a case, test the case, and send the outcome, until killed."""
+    """Test cases in a loop, which ends when the process is killed.
+
+    Each pass of the loop receives the family and number of a case, tests the case and sends the outcome.
+    """
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)
@@ -115,9 +121,9 @@ def run_worker(seed: int, pipe: Connection) -> None:
 
 
 def fuzz(
-    asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
+    cases: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    waiting = iter(list(asked))
+    waiting = iter(list(cases))
     counts: collections.Counter[str] = collections.Counter()
 
     def run(_: int) -> None:
@@ -126,13 +132,13 @@ def fuzz(
             word, details = worker.evaluate(family, number)
             counts[word] += 1
             if word not in PASSED:
-                made = make_case(seed, family, number)
+                case = make_case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
-                (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(made.data)
-                note = f"{made.description}\n{word}\n{details}\n"
+                (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(case.data)
+                note = f"{case.description}\n{word}\n{details}\n"
                 (keep / f"{family}-{seed}-{number}.txt").write_text(note, "utf-8")
-                print(f"{family} {number} ({made.name}): {word}", flush=True)
+                print(f"{family} {number} ({case.name}): {word}", flush=True)
         worker.stop(0.0)
 
     with ThreadPoolExecutor(jobs) as pool:
@@ -142,8 +148,8 @@ def fuzz(
 
 def list_cases(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
     chosen = [family for family in families if family != MUTANTS]
-    asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
-    return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
+    mutant_cases = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
+    return mutant_cases + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
 
 
 def main() -> int:
@@ -159,13 +165,13 @@ def main() -> int:
     option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
     options = parser.parse_args()
     families = options.family or FAMILIES
-    asked = list_cases(families, options.mutants, options.robots)
+    cases = list_cases(families, options.mutants, options.robots)
     if options.only is not None:
         if len(families) != 1:
             parser.error("--only needs exactly one --family")
-        asked = [(families[0], options.only)]
+        cases = [(families[0], options.only)]
     start = time.perf_counter()
-    counts = fuzz(asked, options.seed, options.jobs, options.timeout, options.keep)
+    counts = fuzz(cases, options.seed, options.jobs, options.timeout, options.keep)
     seconds, total = time.perf_counter() - start, sum(counts.values())
     print(f"{total} robots of {len(families)} families, seed {options.seed}, {seconds:.0f} s")
     for word, count in counts.most_common():

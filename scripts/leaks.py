@@ -49,7 +49,8 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # A kernel that is loaded later would look like a leak.
+    # Without `use_only`, urdfkin loads some kernels only after many calls.
+    # The memory of such a kernel would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

@@ -1,4 +1,4 @@
-"""Draw the imports between packages: docs/images/architecture.svg, and the table in docs/architecture.md.
+"""Draw the imports between packages. Write docs/images/architecture.svg and a table in docs/architecture.md.
 
 docs/architecture.toml defines the packages and their order. tests/test_architecture.py checks the imports
 with the functions of this script. Every import counts: imports for types, imports inside functions, and
@@ -58,7 +58,7 @@ def package_of(module: str) -> str:
 
 
 def imported_names(text: str) -> Iterator[str]:
-    """Yield the names that a module's text imports; a name from a string ends in `.*`.
+    """Yield the names that a module's text imports. A name from a string ends in `.*`.
 
     >>> list(imported_names("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
@@ -70,8 +70,8 @@ def imported_names(text: str) -> Iterator[str]:
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield from (f"{'.' * node.level}{node.module or ''}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Constant) and (found := _NAMED.fullmatch(str(node.value))):
-            yield f"{found[1]}.*"
+        elif isinstance(node, ast.Constant) and (match := _NAMED.fullmatch(str(node.value))):
+            yield f"{match[1]}.*"
 
 
 @cache
@@ -131,11 +131,11 @@ def find_cycles() -> list[list[str]]:
 
 def package_imports() -> set[tuple[str, str]]:
     pairs = (
-        (package_of(one), package_of(other))
-        for one, others in imports_by_module().items()
-        for other in others
+        (package_of(module), package_of(imported))
+        for module, imports in imports_by_module().items()
+        for imported in imports
     )
-    return {(one, other) for one, other in pairs if one != other}
+    return {(importer, imported) for importer, imported in pairs if importer != imported}
 
 
 _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
@@ -146,7 +146,7 @@ def draw_picture() -> str:
 
     A dot shows that the package of the row imports the package of the column.
     """
-    place = {package.name: number for number, package in enumerate(PACKAGES)}
+    index = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"'
@@ -155,26 +155,28 @@ def draw_picture() -> str:
         f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
     ]
     for number, package in enumerate(PACKAGES):
-        y, own = _TOP + _ROW * number, _LEFT + _CELL * number
+        y, cell_x = _TOP + _ROW * number, _LEFT + _CELL * number
         purpose = escape(package.purpose.replace("`", ""))
         lines += [
-            f'<rect x="6" y="{y}" width="{own + _CELL - 8}" height="{_ROW - 4}" rx="5" fill="#eef2f7"/>',
+            f'<rect x="6" y="{y}" width="{cell_x + _CELL - 8}" height="{_ROW - 4}" rx="5" fill="#eef2f7"/>',
             f'<rect x="6" y="{y}" width="{_LEFT - 16}" height="{_ROW - 4}" rx="5" fill="#0072B2"/>',
             f'<text x="14" y="{y + 18}" fill="#ffffff" font-weight="bold">{package.name}</text>',
-            f'<rect x="{own + 4}" y="{y + 5}" width="16" height="16" rx="3" fill="#0072B2"/>',
-            f'<text x="{own + _CELL + 8}" y="{y + 18}" fill="#222222">{purpose}</text>',
-            f'<text transform="translate({own + 16} {_TOP - 8}) rotate(-90)" fill="#666">'
+            f'<rect x="{cell_x + 4}" y="{y + 5}" width="16" height="16" rx="3" fill="#0072B2"/>',
+            f'<text x="{cell_x + _CELL + 8}" y="{y + 18}" fill="#222222">{purpose}</text>',
+            f'<text transform="translate({cell_x + 16} {_TOP - 8}) rotate(-90)" fill="#666">'
             f"{package.name}</text>",
         ]
-    for below, above in sorted((place[one], place[other]) for one, other in package_imports()):
+    for below, above in sorted(
+        (index[importer], index[imported]) for importer, imported in package_imports()
+    ):
         x, y = _LEFT + _CELL * above + _CELL // 2, _TOP + _ROW * below + 13
-        said = f"{PACKAGES[below].name} imports {PACKAGES[above].name}"
-        lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#D55E00"><title>{said}</title></circle>')
+        title = f"{PACKAGES[below].name} imports {PACKAGES[above].name}"
+        lines.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#D55E00"><title>{title}</title></circle>')
     return "\n".join((*lines, "</svg>", ""))
 
 
 def make_page() -> str:
-    rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
+    rows = [(f"`{package.name}`", package.purpose, package.contents) for package in PACKAGES]
     packages = table(("Package", "Purpose", "Contents"), rows)
     return insert_parts(PAGE.read_text(encoding="utf-8"), packages=packages)
 

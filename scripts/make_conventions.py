@@ -1,11 +1,12 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
-For each row, the script compares a library's result with several candidate definitions, on a random robot and
-motion. The script writes the definition that matches. A test checks that the page is current.
+For most rows, the script computes a result of each library for a random motion of a given robot. The script
+also computes the quantity by several definitions, and writes the only definition that agrees with the result.
+A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue, in the library's convention, and writes the
-results to conventions.toml.
+first runs each installed library on all robots of the catalogue. Each library uses its own convention. The
+script writes the results to conventions.toml.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -160,9 +161,9 @@ class MeasuredMotion:
     def velocity_readings(self) -> dict[str, FloatArray]:
         R, p, v, w, _, _ = self.motion()
         points = {
-            "of the frame's origin, in world axes": (v, w),
-            "of the frame's origin, in its own axes": (R.T @ v, R.T @ w),
-            "of the body point at the world origin, in world axes": (v - np.cross(w, p), w),
+            "velocity of the frame's origin, in world axes": (v, w),
+            "velocity of the frame's origin, in the frame's axes": (R.T @ v, R.T @ w),
+            "velocity of the body point at the world's origin, in world axes": (v - np.cross(w, p), w),
         }
         linear_first = {f"[linear; angular] {name}": np.concatenate(parts) for name, parts in points.items()}
         other = {f"[angular; linear] {name}": np.concatenate(parts[::-1]) for name, parts in points.items()}
@@ -174,8 +175,8 @@ class MeasuredMotion:
         linear = {
             "classical: the second derivative of the origin's position": a,
             "spatial: the classical acceleration minus w x v": spatial,
-            "classical, plus 9.81 m/s^2 upwards for gravity": a + up,
-            "spatial, plus 9.81 m/s^2 upwards for gravity": spatial + up,
+            "the classical acceleration plus 9.81 m/s^2 upwards because of gravity": a + up,
+            "the spatial acceleration plus 9.81 m/s^2 upwards because of gravity": spatial + up,
         }
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
@@ -201,8 +202,8 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
         theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
         mujocos = "not available"
         if local is not None:
-            found = measured.mujoco_vector(mujoco.mj_objectVelocity, local)
-            mujocos = f"{find_definition(found, readings)} (`flg_local={local}`)"
+            velocity = measured.mujoco_vector(mujoco.mj_objectVelocity, local)
+            mujocos = f"{find_definition(velocity, readings)} (`flg_local={local}`)"
         ours = robot.velocity(measured.q, measured.v, "l3", name)
         yield (
             f"velocity, `{name}`",
@@ -211,20 +212,20 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
             mujocos,
         )
     columns = np.zeros((6, 3))  # MuJoCo's `jacp` above `jacr`, at the body's origin
-    at = measured.mj_data.xpos[measured.body]
-    mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], at, measured.body)
+    position = measured.mj_data.xpos[measured.body]
+    mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], position, measured.body)
     yield (
-        "rows of a Jacobian J, determined from J v",
+        "product of a Jacobian and the joint velocities",
         find_definition(robot.jacobian(measured.q, "l3") @ measured.v, readings),
         find_definition(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ measured.v, readings),
         f"`mj_jac`, `jacp` above `jacr`: {find_definition(columns @ measured.v, readings)}",
     )
     _, p, v, w, _, _ = measured.motion()
     com = measured.mj_data.subtree_com[measured.mj_model.body_rootid[measured.body]]
-    at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
+    at_com = "[angular; linear] velocity of the body point at the tree's centre of mass, in world axes"
     points = {
         at_com: np.concatenate((w, v + np.cross(w, com - p))),
-        "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
+        "[angular; linear] velocity of the frame's origin, in world axes": np.concatenate((w, v)),
     }
     stored = measured.data.v[measured.model.frames[measured.frame].parentJoint].vector
     yield (
@@ -260,25 +261,29 @@ def _name_order(names: Iterable[str]) -> str:
 
 
 def _layout_rows() -> Iterator[Row]:
-    limbs, turns, follows = (mujoco.MjModel.from_xml_string(text) for text in (TREE, CONTINUOUS, MIMIC))
-    data = mujoco.MjData(follows)
+    tree_model, continuous_model, mimic_model = (
+        mujoco.MjModel.from_xml_string(text) for text in (TREE, CONTINUOUS, MIMIC)
+    )
+    data = mujoco.MjData(mimic_model)
     data.qpos[:] = 0.7, 0.0, 0.0
-    mujoco.mj_kinematics(follows, data)
+    mujoco.mj_kinematics(mimic_model, data)
     mujocos = "coupled"
-    if data.qpos[1] == 0.0 and follows.neq == 1:
-        mujocos = f"independent, {follows.nq} coordinates; {follows.neq} constraint, in the dynamics only"
+    if data.qpos[1] == 0.0 and mimic_model.neq == 1:
+        mujocos = (
+            f"independent, {mimic_model.nq} coordinates; {mimic_model.neq} constraint, in the dynamics only"
+        )
     free, coupled = (pin.buildModelFromXML(MIMIC, mimic=mimic) for mimic in (False, True))
     yield (
         "order of coordinates",
         _name_order(urdfkin.load(TREE).coordinate_names),
         _name_order(list(pin.buildModelFromXML(TREE).names)[1:]),
-        _name_order(limbs.joint(i).name for i in range(limbs.njnt)),
+        _name_order(tree_model.joint(i).name for i in range(tree_model.njnt)),
     )
     yield (
         "numbers in q for a continuous joint",
         f"{urdfkin.load(CONTINUOUS).nq // 3}, the angle",
         f"{pin.buildModelFromXML(CONTINUOUS).nq // 3}, its cosine and sine",
-        f"{turns.nq // 3}, the angle",
+        f"{continuous_model.nq // 3}, the angle",
     )
     yield (
         "a joint with `<mimic>`",
@@ -293,9 +298,9 @@ def _layout_rows() -> Iterator[Row]:
 
 def _read_answers(text: str) -> tuple[str, str, str]:
 
-    def reads(load: Callable[..., object], **how: bool) -> bool:
+    def reads(load: Callable[..., object], **options: bool) -> bool:
         try:
-            load(text, **how)
+            load(text, **options)
         except ValueError:
             return False
         return True
@@ -343,20 +348,20 @@ def _free_body_rows() -> Iterator[Row]:
     )
     yield "q of a free body", ours, theirs, third
     axes = {
-        "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
-        "linear in world axes, angular in the body's own": np.concatenate((rates[:3], R @ rates[3:])),
+        "both in the body's axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
+        "linear in world axes, angular in the body's axes": np.concatenate((rates[:3], R @ rates[3:])),
         "both in world axes": rates,
     }
     six = np.empty(6)
     mujoco.mj_objectVelocity(mj_model, mj_data, mujoco.mjtObj.mjOBJ_XBODY, 1, six, 0)
     pin.forwardKinematics(model, data, q, rates)
     of_pinocchio = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
-    found = robot.velocity(q, rates, "l1"), of_pinocchio, np.roll(six, 3)
+    velocities = robot.velocity(q, rates, "l1"), of_pinocchio, np.roll(six, 3)
     yield (
         "v of a free body",
-        find_definition(found[0], axes),
-        find_definition(found[1], axes),
-        find_definition(found[2], axes),
+        find_definition(velocities[0], axes),
+        find_definition(velocities[1], axes),
+        find_definition(velocities[2], axes),
     )
 
 
@@ -366,33 +371,37 @@ def _make_table(names: tuple[str, ...]) -> str:
     return table(heads, [(what, *(column[what] for column in columns)) for what in columns[0]])
 
 
-def _make_cells(how: Convention) -> dict[str, str]:
+def _make_cells(convention: Convention) -> dict[str, str]:
     order = {"given": "no known rule", "name": "by name", "file": "that of the file"}.get(
-        how.order, how.order.replace("file", "place in the file")
+        convention.order, convention.order.replace("file", "place in the file")
     )
-    parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
-    q = ", then ".join(parts if how.base_q == "position first" else parts[::-1])
+    parts = ["x, y, z", f"q{', q'.join(convention.quaternion)}"]
+    q = ", then ".join(parts if convention.base_q == "position first" else parts[::-1])
     axes = {"body": "its own axes", "parent": "world axes"}
-    v = [f"linear in {axes[how.linear]}", f"angular in {axes[how.angular]}"]
-    v = v if how.base_v == "linear first" else v[::-1]
-    free = how.name not in ("rtb", "kdl")
+    v = [f"linear in {axes[convention.linear]}", f"angular in {axes[convention.angular]}"]
+    v = v if convention.base_v == "linear first" else v[::-1]
+    free = convention.name not in ("rtb", "kdl")
     links = "".join(
-        f" [{k}]({source.split(' ', maxsplit=1)[0].rstrip(':')})" for k, source in enumerate(how.sources, 1)
+        f" [{k}]({source.split(' ', maxsplit=1)[0].rstrip(':')})"
+        for k, source in enumerate(convention.sources, 1)
     )
     return {
         "order of joints": order,
         "names of joints": {"urdf": "those of the URDF", "usd": "USD, `1` is `tn__1_`"}.get(
-            how.names, f"identifiers, `1` is `{spell_name('1', how.names)}`"
+            convention.names, f"identifiers, `1` is `{spell_name('1', convention.names)}`"
         ),
-        "q of a continuous joint": "the angle" if how.continuous == 1 else "its cosine and sine",
-        "unit of angles": how.angle,
-        "mimic joint": "own coordinate" if how.mimic == "own" else "none",
+        "q of a continuous joint": "the angle" if convention.continuous == 1 else "its cosine and sine",
+        "unit of angles": convention.angle,
+        "mimic joint": "own coordinate" if convention.mimic == "own" else "none",
         "q of a free body": q if free else "not available",
-        "v of a free body": f"{', '.join(v)}{', at the centre of mass' * (how.point != 'origin')}"
+        "v of a free body": f"{', '.join(v)}{', at the centre of mass' * (convention.point != 'origin')}"
         if free
         else "not available",
-        "six-vector": "[linear; angular]" if how.six_vectors == "linear first" else "[angular; linear]",
-        "evidence": (f"measured: {how.measurement}" if how.measurement else how.evidence) + links,
+        "six-vector": "[linear; angular]"
+        if convention.six_vectors == "linear first"
+        else "[angular; linear]",
+        "evidence": (f"measured: {convention.measurement}" if convention.measurement else convention.evidence)
+        + links,
     }
 
 
@@ -406,11 +415,11 @@ def write_measurements() -> None:
         except metadata.PackageNotFoundError:
             continue
         head, mark, rest = DATA.read_text("utf-8").partition(f"[{name}]\n")
-        own, blank, others = rest.partition("\n\n")
-        own = re.sub(r"\nmeasurement = .*", "", own).replace(
+        section, blank, others = rest.partition("\n\n")
+        section = re.sub(r"\nmeasurement = .*", "", section).replace(
             'evidence = "measured"', f'evidence = "measured"\n{line}'
         )
-        DATA.write_text(head + mark + own + blank + others, "utf-8")
+        DATA.write_text(head + mark + section + blank + others, "utf-8")
 
 
 def _measure_library(name: str, make: Callable[[Any, Path], Any]) -> str:
@@ -427,12 +436,12 @@ def _measure_library(name: str, make: Callable[[Any, Path], Any]) -> str:
             except Exception as error:
                 print(f"{name}: {name_of_robot}: {type(error).__name__}: {str(error)[:200]}")
                 continue
-        bad = any((found > bound).any() for found, bound in pairs)
+        bad = any((errors > bound).any() for errors, bound in pairs)
         if bad or list(conversion.joint_names) != library.names:
             print(f"{name}: {name_of_robot}: different")
             continue
         agree += 1
-        worst = max(worst, *(float(found.max(initial=0.0)) for found, _ in pairs))
+        worst = max(worst, *(float(errors.max(initial=0.0)) for errors, _ in pairs))
         share = max(share, *(float((x[bound > 0] / bound[bound > 0]).max(initial=0.0)) for x, bound in pairs))
     return f"{agree} of {len(robots)} robots, at most {worst:.0e} off, {100 * share:.2g} % of the bound"
 

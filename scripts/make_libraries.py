@@ -34,7 +34,7 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: A pose is correct if no coordinate (m) and no entry of the rotation matrix differs by more than this.
+#: Maximum error of a correct pose: of a coordinate in metres, and of an entry of the rotation matrix.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 TOLERANCE = 1e-9
 #: Time limit (s) of the process that tests the remaining features.
@@ -73,26 +73,26 @@ def make_cell(
     )
     if worst <= TOLERANCE:
         return {"verdict": "right"}
-    found: dict[str, Any] = {"verdict": "wrong", "difference": float(f"{worst:.3g}")}
+    cell: dict[str, Any] = {"verdict": "wrong", "difference": float(f"{worst:.3g}")}
     free = [name for name in answer["joints"] if name not in draw_configurations(robot)[0]]
     notes = [f"{name} has no coordinate" for name in answer["unset"]]
     notes += [f"{name} is free" for name in free]
     if notes:
-        found["note"] = "; ".join(notes)
+        cell["note"] = "; ".join(notes)
     documented = DATA.get("documented", ())
-    if any(feature.name in one["features"] and one["library"] == library for one in documented):
-        found["verdict"] = "documented"
-    return found
+    if any(feature.name in note["features"] and note["library"] == library for note in documented):
+        cell["verdict"] = "documented"
+    return cell
 
 
 def make_environment(folder: Path, library: str) -> Path:
-    place, package = folder / library, LIBRARIES[library].package
-    python = place / "bin" / "python"
-    wanted = f"{package}=={DATA['versions'][library]}"
+    environment, package = folder / library, LIBRARIES[library].package
+    python = environment / "bin" / "python"
+    requirement = f"{package}=={DATA['versions'][library]}"
     check = [str(python), "-I", str(Path(adapters.__file__)), library]
     if not python.exists() or subprocess.run(check, input="[]", text=True, check=False).returncode:
-        venv.create(place, with_pip=True)
-    subprocess.run([str(python), "-m", "pip", "install", "--quiet", wanted], check=True)
+        venv.create(environment, with_pip=True)
+    subprocess.run([str(python), "-m", "pip", "install", "--quiet", requirement], check=True)
     return python
 
 
@@ -101,21 +101,21 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
     while todo:
         try:
             command = [str(python), "-I", str(Path(adapters.__file__)), library]
-            done = subprocess.run(
+            process = subprocess.run(
                 command, input=json.dumps(todo).encode(), capture_output=True, timeout=_SECONDS, check=False
             )
-            written, how = done.stdout, f"its process ended with {done.returncode}"
+            output, reason = process.stdout, f"its process ended with {process.returncode}"
         except subprocess.TimeoutExpired as late:
-            written, how = late.stdout or b"", f"no answer in {_SECONDS} s"
-        found = [json.loads(line) for line in written.splitlines()]
-        yield from found
-        todo = todo[len(found) :]
+            output, reason = late.stdout or b"", f"no answer in {_SECONDS} s"
+        answers = [json.loads(line) for line in output.splitlines()]
+        yield from answers
+        todo = todo[len(answers) :]
         if todo:
-            yield {"name": todo.pop(0)["name"], "error": how}
+            yield {"name": todo.pop(0)["name"], "error": reason}
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Measure some libraries; all other libraries keep their earlier values."""
+    """Measure the given libraries. All other libraries keep their earlier values."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}
@@ -125,10 +125,11 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
     for library in libraries:
         print(library, flush=True)
         python = make_environment(folder, library)
-        found = {answer["name"]: answer for answer in run_library(python, library, cases)}
+        answers = {answer["name"]: answer for answer in run_library(python, library, cases)}
         versions[library] = DATA["versions"][library]
         cells[library] = {
-            name: make_cell(feature, robots[name], library, found[name]) for name, feature in FEATURES.items()
+            name: make_cell(feature, robots[name], library, answers[name])
+            for name, feature in FEATURES.items()
         }
     order = [name for name in LIBRARIES if name in cells]
     return {
@@ -142,23 +143,23 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # the documented differences; a key is the letter of a footnote
+    notes: dict[str, Any] = {}  # maps the letter of each footnote to a documented difference
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:
             notes[chr(ord("a") + len(notes))] = note
 
     def words(library: str, feature: str) -> str:
-        one = cells[library][feature]
-        if "difference" not in one:
-            return str(one["verdict"])
+        cell = cells[library][feature]
+        if "difference" not in cell:
+            return str(cell["verdict"])
         letters = (
             f" *{x}*" for x, n in notes.items() if n["library"] == library and feature in n["features"]
         )
-        return f"{one['difference']:.2g}{next(letters, '')}"
+        return f"{cell['difference']:.2g}{next(letters, '')}"
 
     rows = [(name, *(words(library, name) for library in cells)) for name in FEATURES]
-    counts = {name: Counter(one["verdict"] for one in cells[name].values()) for name in cells}
+    counts = {name: Counter(cell["verdict"] for cell in cells[name].values()) for name in cells}
     rows += [
         (f"*{title}*", *(str(counts[name][verdict]) for name in cells)) for verdict, title in VERDICTS.items()
     ]
@@ -168,10 +169,10 @@ def make_page(text: str, figures: Mapping[str, Any]) -> str:
     ]
     reasons: dict[tuple[str, str], list[str]] = {}
     for library, column in cells.items():
-        for feature, one in column.items():
-            if reason := one.get("message") or one.get("note"):
+        for feature, cell in column.items():
+            if reason := cell.get("message") or cell.get("note"):
                 clean = reason.replace("|", r"\|").replace("`", "'")
-                quoted = f"`{clean}`" if one["verdict"] == "refused" else clean
+                quoted = f"`{clean}`" if cell["verdict"] == "refused" else clean
                 reasons.setdefault((library, quoted), []).append(feature)
     return insert_parts(
         text,

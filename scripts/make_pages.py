@@ -54,7 +54,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: The meaning of each warning for the robots of the catalogue that have it.
+#: Maps the code of each warning to the meaning of this warning for robots of the catalogue.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -75,13 +75,13 @@ LIMITS = {
     "--max-name": (DEFAULT_SIZE_LIMITS.name, "characters of a name"),
     "--max-number": (DEFAULT_SIZE_LIMITS.number, "characters of a number"),
     "--max-markup": (DEFAULT_SIZE_LIMITS.markup, "bytes of one tag or comment"),
-    "": (MAX_COMPLETE_FINDINGS, "complete findings of a kind, also in JSON and SARIF"),
+    "": (MAX_COMPLETE_FINDINGS, "complete findings with one code and severity, in all output formats"),
 }
 
 
 def make_findings_parts() -> dict[str, str]:
     limits = [
-        (f"{limit:,} {words}", f"`{option}`" * bool(option)) for option, (limit, words) in LIMITS.items()
+        (f"{limit:,} {meaning}", f"`{option}`" * bool(option)) for option, (limit, meaning) in LIMITS.items()
     ]
     codes = []
     for digit, family in FAMILIES.items():
@@ -98,17 +98,19 @@ def make_findings_parts() -> dict[str, str]:
         ]
         heads = ("code", "name", "severity", "finding", "Pinocchio")
         codes.append(f"### {family}\n\n{table(heads, rows)}\n")
-    found = []
-    for name, finding in ((one, finding) for one in catalogue() for finding in list_warnings(one)):
+    robot_rows = []
+    for name, finding in ((robot, finding) for robot in catalogue() for finding in list_warnings(robot)):
         lines = f"line {finding.line}" + (
             f" and {len(finding.other_lines)} more" if finding.other_lines else ""
         )
-        what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-        found.append((name, finding.code, lines, _escape(shorten(what, 200)), REMARKS[finding.code]))
+        description = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
+        robot_rows.append(
+            (name, finding.code, lines, _escape(shorten(description, 200)), REMARKS[finding.code])
+        )
     return {
         "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
         "codes": "\n".join(codes),
-        "robots": table(("robot", "code", "where", "what", "meaning"), found),
+        "robots": table(("robot", "code", "where", "what", "meaning"), robot_rows),
     }
 
 
@@ -123,7 +125,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # An entry without a description has the description of its type.
+            # If an entry has no description, the page shows the description of the entry's type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -232,7 +234,8 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance between neighbouring doubles at the quantity's largest number.
+            # A step is the distance between two neighbouring doubles.
+            # This distance is computed at the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
@@ -257,13 +260,13 @@ def _chain_rows() -> Iterator[tuple[object, ...]]:
 
 def _compute_enclosures(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
     """Return interval results of random motions, and the processor time (ms) per motion."""
-    found, times = [], []
+    enclosures, times = [], []
     for seed in (0, *range(count)):  # The first motion is not timed.
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
         q, begin = robot.sample(1, seed)[0], time.process_time()
-        found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
+        enclosures.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
         times.append(time.process_time() - begin)
-    return found[1:], 1e3 * sum(times[1:]) / count
+    return enclosures[1:], 1e3 * sum(times[1:]) / count
 
 
 def make_askew_chain(length: int) -> str:

@@ -36,24 +36,24 @@ def draw_reference_frames() -> Any:
     figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.6), sharey=True, layout="constrained")
     points = arm.placement(q, ["base", "link_2", "tip"])[:, :2, 3]
     R_tip, tip, world = arm.placement(q, "tip")[:2, :2], points[-1], np.eye(2)
-    told = (
+    views = (
         ("local_world_aligned", tip, world, "(-0.8, 0.5): tip velocity in world axes"),
         ("local", tip, R_tip, "(0.5, 0.8): tip velocity in tip axes"),
         ("world", np.zeros(2), world, "(0, -0.5): velocity of the point at the origin"),
     )
-    for axes, (reference, at, R, title) in zip(panels, told, strict=True):
+    for axes, (reference, origin, R, title) in zip(panels, views, strict=True):
         look: dict[str, Any] = {"color": "#c3ccd6", "linewidth": 7, "markersize": 9, "markerfacecolor": QUIET}
         axes.plot(*points.T, "-o", zorder=1, **look)
         if reference == "world":
-            axes.plot(*np.array([tip, at]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
+            axes.plot(*np.array([tip, origin]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
         for k, color in enumerate((VERMILION, GREEN)):
-            draw_arrow(axes, at, 0.17 * R[:, k], color)
-            place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
-            axes.text(*place, "xy"[k], color=color, ha="center", va="center", fontsize=9)
+            draw_arrow(axes, origin, 0.17 * R[:, k], color)
+            label_position = origin + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
+            axes.text(*label_position, "xy"[k], color=color, ha="center", va="center", fontsize=9)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
-        draw_arrow(axes, at, 0.6 * R @ numbers, INK)
+        draw_arrow(axes, origin, 0.6 * R @ numbers, INK)
         for k, color in enumerate((VERMILION, GREEN)):
-            begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
+            begin = origin + (0.6 * R[:, 0] * numbers[0] if k else 0)
             ends = np.array([begin, begin + 0.6 * R[:, k] * numbers[k]])
             axes.plot(*ends.T, color=color, linewidth=1.2, ls="--")
         axes.set(xlim=(-0.35, 0.95), ylim=(-0.36, 0.8), xticks=(), yticks=())

@@ -124,13 +124,16 @@ def draw_integral_of_w(figure: Any) -> None:
 
 
 def plot_euler_singularity(figure: Any) -> None:
-    """Plot the condition number of Omega (angle rates to angular velocity) against the middle angle."""
+    """Plot the condition number of the matrix Omega against the middle Euler angle.
+
+    Omega converts the rates of the Euler angles to the angular velocity.
+    """
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):
-        turns = np.stack((np.zeros_like(middle), middle, np.zeros_like(middle)), axis=-1)
+        angles = np.stack((np.zeros_like(middle), middle, np.zeros_like(middle)), axis=-1)
         good = np.abs(np.cos(middle) if name == "xyz" else np.sin(middle)) > 1e-9
-        degrees, condition = np.degrees(middle[good]), euler_condition(name, turns[good])
+        degrees, condition = np.degrees(middle[good]), euler_condition(name, angles[good])
         axes.semilogy(degrees, condition, color=color, linestyle=dashes, label=label, linewidth=2)
     axes.set(xlabel="middle angle [degrees]", ylabel="condition number of Omega")
     axes.set(ylim=(0.9, 2e3), xlim=(0, 180), xticks=range(0, 181, 30))
@@ -178,12 +181,14 @@ def draw_acceleration_parts(figure: Any) -> None:
     reach = arm.R_0_1 @ [1.35, 0, 0]
     axes.plot([0, reach[0]], [0, reach[1]], color="#c3ccd6", linewidth=7, solid_capstyle="round", zorder=1)
     names = (("transverse", BLUE), ("centripetal", VERMILION), ("coriolis", ORANGE), ("relative", GREEN))
-    at = tip
+    start = tip
     for name, color in names:
         vector = 0.35 * getattr(parts, name)
-        draw_arrow(axes, at[:2], vector[:2], color, name)
-        _write_name(axes, at + 0.5 * vector, vector if name in ("transverse", "relative") else -vector, name)
-        at = at + vector
+        draw_arrow(axes, start[:2], vector[:2], color, name)
+        _write_name(
+            axes, start + 0.5 * vector, vector if name in ("transverse", "relative") else -vector, name
+        )
+        start = start + vector
     draw_arrow(axes, tip[:2], 0.35 * parts.total[:2], INK, "the sum")
     _write_name(axes, tip + 0.09 * parts.total, -parts.total, "the sum")
     axes.plot(*tip[:2], "o", color=INK, markersize=8, zorder=5)

@@ -27,25 +27,25 @@ from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.validation.store import Manifest, open_store
 
 
-def validate_with_store(*robots: Any, **how: Any) -> ValidationReport:
+def validate_with_store(*robots: Any, **options: Any) -> ValidationReport:
     with tempfile.TemporaryDirectory() as folder:
-        report = validate(*robots, store=folder, **how)
+        report = validate(*robots, store=folder, **options)
         files = [path.stat().st_size for path in Path(folder).glob("chunks/*/*")]
         print(f"    {len(files)} files, {sum(files) / len(files):,.0f} bytes each")
         return report
 
 
-def validate_on_cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local Dask workers; print the time without the start and the end of the workers."""
-    with connect_cluster("local:2") as two:
-        validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
-        chunks = len(Chunking(how["samples"])) * len(robots[0])
+def validate_on_cluster(*robots: Any, **options: Any) -> ValidationReport:
+    """Validate with two local Dask workers. The printed times exclude starting and stopping the workers."""
+    with connect_cluster("local:2") as cluster:
+        validate("planar_two_link", samples=400, executor=cluster)  # the workers load their modules
+        chunks = len(Chunking(options["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
-        report = validate(*robots, executor=two, **how)
-        own = 1e3 * (time.process_time() - before) / chunks
-        print(f"    {time.perf_counter() - begin:.1f} s without the start and the end of the workers")
+        report = validate(*robots, executor=cluster, **options)
+        chunk_ms = 1e3 * (time.process_time() - before) / chunks
+        print(f"    run time without starting and stopping the workers: {time.perf_counter() - begin:.1f} s")
         print(
-            f"    {own:.1f} ms of processor time in client and scheduler per chunk of samples;"
+            f"    processor time of client and scheduler: {chunk_ms:.1f} ms for each of"
             f" {chunks} chunks of samples"
         )
         return report
@@ -86,15 +86,15 @@ def measure_chunk() -> None:
             moments.append(time.process_time())
         return 1e3 * median(after - before for before, after in pairwise(moments))
 
-    robot, cut = make_robot_input("ur5"), Chunking(100_000)
-    chunk = cut.chunk(robot, 0, 1)
-    found = run_chunk(chunk)
+    robot, chunking = make_robot_input("ur5"), Chunking(100_000)
+    chunk = chunking.chunk(robot, 0, 1)
+    result = run_chunk(chunk)
     print(f"a chunk of {chunk.configurations} samples: {measure_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
-    manifest = Manifest.of([robot], cut.samples, 0, "now")
-    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
-        print(f"time to store it: {measure_cost(lambda i: kept.write_answer(0, i, found)):.2f} ms")
-        print(f"time to read it: {measure_cost(lambda i: kept.read_answer(0, i)):.2f} ms")
-    print(f"time to add two: {measure_cost(lambda _: found + found):.2f} ms")
+    manifest = Manifest.of([robot], chunking.samples, 0, "now")
+    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as store:
+        print(f"time to store it: {measure_cost(lambda i: store.write_answer(0, i, result)):.2f} ms")
+        print(f"time to read it: {measure_cost(lambda i: store.read_answer(0, i)):.2f} ms")
+    print(f"time to add two: {measure_cost(lambda _: result + result):.2f} ms")
 
 
 if __name__ == "__main__":

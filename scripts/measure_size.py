@@ -24,22 +24,24 @@ def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -
 
     The result contains neither the package named by `without` nor packages that only this package needs.
     """
-    found: dict[str, int] = {}
+    sizes: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]
     while waiting:
-        name, wanted = waiting.pop()
+        name, selected_extras = waiting.pop()
         name = name.lower().replace("_", "-")
-        if (name, wanted) in seen or name == without:
+        if (name, selected_extras) in seen or name == without:
             continue
-        seen.add((name, wanted))
+        seen.add((name, selected_extras))
         distribution = importlib.metadata.distribution(name)
         files = [Path(str(path.locate())) for path in distribution.files or ()]
-        found[name] = sum(file.stat().st_size for file in files if file.is_file())
+        sizes[name] = sum(file.stat().st_size for file in files if file.is_file())
         for need in map(Requirement, distribution.requires or ()):
-            if need.marker is None or any(need.marker.evaluate({"extra": extra}) for extra in {"", *wanted}):
+            if need.marker is None or any(
+                need.marker.evaluate({"extra": extra}) for extra in {"", *selected_extras}
+            ):
                 waiting.append((need.name, frozenset(need.extras)))
-    return found
+    return sizes
 
 
 def measure_wheel() -> int:

@@ -71,12 +71,12 @@ def measure_medians(rounds: int, folder: Path) -> list[float]:
     """Return the median processor time (s) of each row. The first round only writes bytecode files."""
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
-    found: list[list[float]] = [[] for _ in ROWS]
+    seconds: list[list[float]] = [[] for _ in ROWS]
     for k in range(rounds + 1):
         for i, row in enumerate(ROWS):
             words = [str(robot) if word == "ROBOT" else word for word in row.arguments]
-            found[i].append(measure_seconds(words, folder / f"{k}-{i}" if row.empty_cache else None))
-    return [statistics.median(times[1:]) for times in found]
+            seconds[i].append(measure_seconds(words, folder / f"{k}-{i}" if row.empty_cache else None))
+    return [statistics.median(times[1:]) for times in seconds]
 
 
 def main() -> int:
@@ -84,22 +84,22 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        found = measure_medians(options.rounds, Path(folder))
+        medians = measure_medians(options.rounds, Path(folder))
     rows = [
         (
             row.name,
             f"{x:.2f}",
-            f"{x / found[0]:.2f}",
+            f"{x / medians[0]:.2f}",
             f"{row.max_ratio:.1f}" if math.isfinite(row.max_ratio) else "",
         )
-        for row, x in zip(ROWS, found, strict=True)
+        for row, x in zip(ROWS, medians, strict=True)
     ]
     heads = ("", "processor time, s", "ratio to the first row", "allowed ratio")
     figures = table(heads, rows, left=1)
     print(figures)
     update_page(PAGE, start=figures)
-    slow = [row.name for row, x in zip(ROWS, found, strict=True) if x > row.max_ratio * found[0]]
-    print(*(f"too slow: {what}" for what in slow), sep="\n", file=sys.stderr)
+    slow = [row.name for row, x in zip(ROWS, medians, strict=True) if x > row.max_ratio * medians[0]]
+    print(*(f"too slow: {name}" for name in slow), sep="\n", file=sys.stderr)
     return int(bool(slow))
 
 

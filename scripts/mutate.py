@@ -5,13 +5,15 @@
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
-The script runs the quick tests that mention the mutated module or belong to its package. If no test fails,
---slow adds the slow tests of this kind, and --whole adds all other quick tests. The script prints every
-undetected mutant, and skips the mutants that docs/mutation.md lists as harmless. In the past, no test
-detected the named mutants. A named mutant replaces code of one function, and one given test must now fail.
+The script first runs the quick tests in the files that mention the mutated module, and in the files for the
+module's package. If no test fails, --slow runs the slow tests in these files. If still no test fails, --whole
+runs all quick tests. The script prints every undetected mutant, and skips the mutants that docs/mutation.md
+lists as harmless. In the past, no test detected the named mutants. A named mutant replaces code of one
+function, and one given test must now fail.
 
-Exit 0: all mutants are detected or harmless. 1: some mutants are not detected, or there is no mutant. 2: no
-file of the package begins with the given path.
+Exit 0: all mutants are detected or harmless.
+Exit 1: some mutants are not detected, or there is no mutant.
+Exit 2: no file of the package begins with the given path.
 """
 
 import argparse
@@ -77,19 +79,22 @@ def find_near_tests(path: Path) -> list[str]:
     If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
     """
     package, _, name = module_name(path).rpartition(".")
-    named = re.compile(
+    pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
-    near = {
+    mentioning_tests = {
         test
         for test, text in _read_tests().items()
-        if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
+        if test.stem == f"test_{path.stem}" or (name in text and pattern.search(text))
     }
     part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     for parts in ((part, f"test_{part}.py"), ("test_robot.py", "verify", "laws")):
-        if own := {test for test in _read_tests() if test.relative_to(TESTS).parts[0] in parts}:
+        if package_tests := {test for test in _read_tests() if test.relative_to(TESTS).parts[0] in parts}:
             break
-    order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
+    order = sorted(
+        mentioning_tests | package_tests,
+        key=lambda test: (path.stem not in test.stem, test not in mentioning_tests, str(test)),
+    )
     return [str(test.relative_to(ROOT)) for test in order]
 
 
@@ -114,7 +119,7 @@ class NamedMutant:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """The function's name in the file, the code, and its replacement: the arguments of `replace_code`."""
+        """The last three arguments of `replace_code`: the function's name, the old code and the new code."""
         return self.function[len(module_name(self.file)) + 1 :], self.before, self.after
 
 
@@ -125,7 +130,10 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Map each harmless mutant, by function and text, to the reason."""
+    """Return the reason why each harmless mutant is harmless.
+
+    A key is the function's full name and the text of the mutant.
+    """
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -151,7 +159,7 @@ class Outcome:
 
 
 def list_mutants(parts: list[str]) -> list[Mutant]:
-    found = []
+    mutants = []
     for path in find_files(parts):
         tree, module, file = (
             ast.parse(path.read_text(encoding="utf-8")),
@@ -159,9 +167,9 @@ def list_mutants(parts: list[str]) -> list[Mutant]:
             path.relative_to(ROOT),
         )
         for number, change in enumerate(list_changes(tree)):
-            place = ".".join(filter(None, (module, function_at(tree, change.line))))
-            found.append(Mutant(f"{module}:{number}", str(file), change.line, change.text, place))
-    return found
+            function = ".".join(filter(None, (module, function_at(tree, change.line))))
+            mutants.append(Mutant(f"{module}:{number}", str(file), change.line, change.text, function))
+    return mutants
 
 
 def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
@@ -247,14 +255,21 @@ def main() -> int:
         parser.error(str(error))
     runs: list[Callable[[], Outcome]]
     if options.named:
-        named = [one for one in named_mutants() if not options.parts or module_name(one.file) in modules]
-        runs = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
+        selected_mutants = [
+            named_mutant
+            for named_mutant in named_mutants()
+            if not options.parts or module_name(named_mutant.file) in modules
+        ]
+        runs = [
+            partial(evaluate_named, named_mutant, timeout=options.timeout)
+            for named_mutant in selected_mutants
+        ]
     else:
         chosen = [mutant for mutant in list_mutants(options.parts) if options.only in (None, mutant.name)]
         if options.sample is not None and options.sample < len(chosen):
             chosen = random.Random(options.seed).sample(chosen, options.sample)
-        how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-        runs = [partial(evaluate, mutant, **how) for mutant in chosen]
+        settings = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
+        runs = [partial(evaluate, mutant, **settings) for mutant in chosen]
     if not runs:
         print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1
@@ -267,8 +282,8 @@ def main() -> int:
             counts[outcome.result] += 1
             if outcome.result != "detected":
                 mutant = outcome.mutant
-                where = f"{mutant.function}:{mutant.line}: {mutant.change}  [{mutant.name}]"
-                print(f"{outcome.result}: {where}", flush=True)
+                location = f"{mutant.function}:{mutant.line}: {mutant.change}  [{mutant.name}]"
+                print(f"{outcome.result}: {location}", flush=True)
     print(f"{len(runs)} mutants: " + ", ".join(f"{n} {result}" for result, n in counts.most_common()))
     return 0 if counts.keys() <= {"detected", "harmless"} else 1
 

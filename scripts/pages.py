@@ -8,7 +8,9 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def insert_parts(page: str, **parts: str) -> str:
-    """Return a page with the given parts; a part must have exactly one place.
+    """Insert the given parts into a page, and return the page.
+
+    Raise ValueError unless the page has exactly one place for each part.
 
     >>> print(insert_parts("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->
@@ -16,9 +18,9 @@ def insert_parts(page: str, **parts: str) -> str:
     <!-- end --> after
     """
     for name, part in parts.items():
-        place = re.compile(rf"(<!-- {name} -->).*?(<!-- end -->)", re.DOTALL)
+        pattern = re.compile(rf"(<!-- {name} -->).*?(<!-- end -->)", re.DOTALL)
         text = part.strip("\n")
-        page, count = place.subn(lambda found, text=text: f"{found[1]}\n{text}\n{found[2]}", page)  # type: ignore[misc]
+        page, count = pattern.subn(lambda match, text=text: f"{match[1]}\n{text}\n{match[2]}", page)  # type: ignore[misc]
         if count != 1:
             raise ValueError(f"the page has {count} places <!-- {name} -->")
     return page

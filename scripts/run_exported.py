@@ -1,12 +1,14 @@
-"""Run exported Python files in this interpreter, which needs no urdfkin, and print one JSON line for each.
+"""Run exported Python files in this interpreter, and print one JSON line for each file.
+
+The interpreter does not need urdfkin.
 
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-The first argument names the library, `torch` or `jax`. The script runs each file's own check; files of the
-format `array` use this library. A file with a Hessian contains the Hessian's true values and error bound. The
-library then differentiates the Jacobian, and each difference from these values must lie within the bound. For
-the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
+The first argument names the library, `torch` or `jax`. The script runs the function `check` of each file.
+Files of the format `array` use this library. A file with a Hessian contains the true Hessian and error
+bounds. For such a file, the library differentiates the Jacobian, and each error must lie within its bound.
+For the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
 `scripts/check_exports.py --library` calls this script.
 """
 
@@ -20,7 +22,7 @@ from typing import Any
 
 
 def error_ratios(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield each check's largest error as a share of its bound."""
+    """Yield the name of each check, and the largest ratio of an error to its bound."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -59,7 +61,7 @@ def check_hessian(scope: dict[str, Any], library: str) -> float:
 def check_compiled(scope: dict[str, Any]) -> float:
     import torch
 
-    found = 0.0
+    largest = 0.0
     for name, letters in scope["INPUTS"].items():
         if name == "hessian":  # The compilation takes minutes.
             continue
@@ -68,12 +70,12 @@ def check_compiled(scope: dict[str, Any]) -> float:
         for kind, eps, table in (("float64", 2.0**-52, "WITHIN"), ("float32", 2.0**-23, "SINGLE")):
             values = scope["_values"](compiled, inputs, kind, "cpu")
             share = max_error_ratio(values, scope["TRUE"][name], scope[table][name], eps)
-            found = found if share <= found else share
-    return found
+            largest = largest if share <= largest else share
+    return largest
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio of a row's error to its bound; NaN counts as the largest number."""
+    """Return the largest ratio of an error to its bound. NaN counts as the largest number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):
@@ -87,11 +89,11 @@ def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
 def main(library: str, paths: list[str]) -> None:
     compiled = True
     for path in paths:
-        found: dict[str, float] = {}
+        ratios: dict[str, float] = {}
         for name, share in error_ratios(path, library, compiled):
-            found[name] = share if not share <= found.get(name, 0.0) else found.get(name, 0.0)
+            ratios[name] = share if not share <= ratios.get(name, 0.0) else ratios.get(name, 0.0)
         compiled = compiled and not path.endswith("_torch.py")
-        print(json.dumps({"file": Path(path).stem, "library": library, **found}), flush=True)
+        print(json.dumps({"file": Path(path).stem, "library": library, **ratios}), flush=True)
 
 
 if __name__ == "__main__":

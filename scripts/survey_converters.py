@@ -3,8 +3,8 @@
     python scripts/survey_converters.py TOOL[=PYTHON]... [--robots NAME...]
 
 PYTHON is the interpreter of an environment with the tool (default: this interpreter). A tool that reads MJCF
-gets the MJCF file that MuJoCo makes of the URDF. A tool that reads USD needs a second tool, which writes the
-USD file; `TOOLS` names the second tool. Install each tool in its own environment, because usd-core and
+gets the MJCF file that MuJoCo makes from the URDF. A tool that reads USD needs a second tool, which writes
+the USD file. `TOOLS` names the second tool. Install each tool in its own environment, because usd-core and
 usd-exchange contain modules with equal names:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
@@ -12,8 +12,8 @@ usd-exchange contain modules with equal names:
 
 With one tool, a row of the table shows the verdict, and bounds on the distance and on the angle between
 matching frames. With several tools, a row has one cell for each tool. The cell shows a short verdict and the
-bound on the distance. The full verdicts are printed to standard error. With several tools, the bounds are
-computed without branch and bound to save time, so they may be larger.
+bound on the distance. The full verdicts are printed to standard error. With several tools, the bounds may
+be larger: to save time, the script computes the bounds without branch and bound.
 
 The script removes shapes, because a converter would search for their meshes. MuJoCo refuses a moving body
 without mass. The script therefore sets options of MuJoCo. With these options, MuJoCo gives such a body a
@@ -48,11 +48,11 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    """A converter: its program, and the tool that writes its input file."""
+    """A converter of robot files."""
 
-    reads: str
-    program: str
-    writes: str = ""
+    reads: str  # The tool that writes the input file. Empty: the input file is the URDF.
+    program: str  # Python code that converts the file `source`.
+    writes: str = ""  # End of the output file's path. Empty: the program prints the path.
 
 
 TOOLS = {
@@ -91,7 +91,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short form of a verdict, by the verdict's first words; the first match counts.
+#: Short forms of verdicts. Each key is the beginning of a verdict. The first matching key counts.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -113,16 +113,18 @@ def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> 
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
     script = f"import pathlib, sys\nsource, to = sys.argv[1:]\n{program}"
-    words = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
+    command = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, cwd=folder)
+        process = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=300, cwd=folder
+        )
     except subprocess.TimeoutExpired:
         raise RefusalError(f"{tool} does not finish within 300 s") from None
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if "Error: " in line] or ["no message"]
-        error = " ".join(done.stderr[done.stderr.rindex(lines[-1]) :].split()).partition("Error: ")[2]
+    if process.returncode:
+        lines = [line for line in process.stderr.splitlines() if "Error: " in line] or ["no message"]
+        error = " ".join(process.stderr[process.stderr.rindex(lines[-1]) :].split()).partition("Error: ")[2]
         raise RefusalError(f"{'the converter' if len(pythons) == 1 else tool} refuses it: {error[:_QUOTED]}")
-    return source, Path(f"{to}{writes}" if writes else done.stdout.strip().splitlines()[-1])
+    return source, Path(f"{to}{writes}" if writes else process.stdout.strip().splitlines()[-1])
 
 
 def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
@@ -148,26 +150,29 @@ def _write_without_shapes(urdf: str, folder: Path) -> Path:
 
 
 def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
-    """Return the verdict, and bounds on the distance and the angle between matching frames.
+    """Return the verdict, and bounds on the distance and on the angle between matching frames.
 
-    The models are compared as they are written. For `urdf-usd-converter`, they are compared after the changes
-    that make them equivalent. The angle is then replaced by the distance that single precision can cause.
+    The bounds apply to the unchanged models. For `urdf-usd-converter`, the bound on the distance applies to
+    the models after the changes that make the models equivalent. The last cell of this tool is the largest
+    distance that rounding to single precision can cause.
     """
     try:
-        found = _compare(tool, pythons, robot)
+        comparison = _compare(tool, pythons, robot)
     except RefusalError as refusal:
         return str(refusal), "", ""
-    verdict = found.verdict.value
-    if found.verdict is Verdict.SAME_AFTER:
-        verdict = f"equivalent up to {', '.join(found.up_to)}"
-    elif not found:
-        verdict = str(found.unexplained[0]) if found.unexplained else found.differences[0].words
+    verdict = comparison.verdict.value
+    if comparison.verdict is Verdict.SAME_AFTER:
+        verdict = f"equivalent up to {', '.join(comparison.up_to)}"
+    elif not comparison:
+        verdict = (
+            str(comparison.unexplained[0]) if comparison.unexplained else comparison.differences[0].words
+        )
     if tool != "urdf-usd-converter":
-        return verdict, length(found.bound_as_written[0]), angle(found.bound_as_written[1])
-    off = length(0.0 if found.worst is None else found.worst.upper)
-    if found.single is None:
-        return "the stage has no rounded number", off, ""
-    return verdict, off, length(found.single[0])
+        return verdict, length(comparison.bound_as_written[0]), angle(comparison.bound_as_written[1])
+    distance = length(0.0 if comparison.worst is None else comparison.worst.upper)
+    if comparison.single is None:
+        return "the stage has no rounded number", distance, ""
+    return verdict, distance, length(comparison.single[0])
 
 
 def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:
@@ -179,7 +184,7 @@ def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> 
 
 
 def _load(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file; read all articulations of a USD file."""
+    """Load a robot from a file. If a USD file has several articulations, load all of them as one robot."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

@@ -23,12 +23,12 @@ def describe_result(path: Path) -> str:
     certificate = robot.certificate()
     if not certificate.verified:
         return "not verified"
-    shapes, _, said = certificate.source_notes.partition("Pinocchio's MJCF reader")
-    whole = ", without its shapes" if "does not compile" in shapes else ""
-    for words in ("agrees on the bodies", "disagrees", "does not accept", "other joints", "no such body"):
-        if words in said:
-            return f"verified{whole}; Pinocchio's MJCF reader: {words}"
-    return f"verified{whole}; {said}"
+    shapes, _, remark = certificate.source_notes.partition("Pinocchio's MJCF reader")
+    suffix = ", without its shapes" if "does not compile" in shapes else ""
+    for phrase in ("agrees on the bodies", "disagrees", "does not accept", "other joints", "no such body"):
+        if phrase in remark:
+            return f"verified{suffix}; Pinocchio's MJCF reader: {phrase}"
+    return f"verified{suffix}; {remark}"
 
 
 if __name__ == "__main__":
@@ -37,6 +37,6 @@ if __name__ == "__main__":
     folder: Path = parser.parse_args().folder
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     counts = Counter(describe_result(path) for path in sorted(folder.rglob("*.xml")) if is_mjcf(path))
-    for said, count in counts.most_common():
-        print(f"{count:5d}  {said}")
+    for result, count in counts.most_common():
+        print(f"{count:5d}  {result}")
     print(f"{sum(counts.values()):5d}  files")

@@ -193,7 +193,7 @@ def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return an array (n, 6, nv): the columns of `J` (n, 6, m) at the indices `columns`, else zeros."""
+    """Return an array of zeros (n, 6, nv), with the columns of `J` (n, 6, m) at the indices `columns`."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
@@ -261,21 +261,21 @@ def mujoco(workload: Workload, quantity: str) -> Iterator[Calls]:
         **{"body": model.body(workload.frame).id, "kind": mujoco.mjtObj.mjOBJ_XBODY},
         **{"x": x, "linear": x[:3], "angular": x[3:]},
     }
-    place = ("qpos[:] = q", "kinematics(m, d)", "comPos(m, d)")
-    move = (*place, "qvel[:] = v", "qacc[:] = a", "comVel(m, d)", "rne(m, d)")
-    one, store, read = {
+    position_lines = ("qpos[:] = q", "kinematics(m, d)", "comPos(m, d)")
+    motion_lines = (*position_lines, "qvel[:] = v", "qacc[:] = a", "comVel(m, d)", "rne(m, d)")
+    lines, store, read = {
         "jacobian": (
-            (*place, "jacBody(m, d, linear, angular, body)", "x"),
-            (*place, "jacBody(m, d, out[k, :3], out[k, 3:], body)"),
+            (*position_lines, "jacBody(m, d, linear, angular, body)", "x"),
+            (*position_lines, "jacBody(m, d, out[k, :3], out[k, 3:], body)"),
             lambda x: x[..., back],
         ),
         "acceleration": (
-            (*move, "get(m, d, kind, body, x, 0)", "x"),
-            (*move, "get(m, d, kind, body, out[k], 0)"),
+            (*motion_lines, "get(m, d, kind, body, x, 0)", "x"),
+            (*motion_lines, "get(m, d, kind, body, out[k], 0)"),
             lambda x: x[..., LINEAR_FIRST],
         ),
     }[quantity]
-    yield Calls("MuJoCo, loop", names, one, store, order, read=read)
+    yield Calls("MuJoCo, loop", names, lines, store, order, read=read)
 
 
 def drake(workload: Workload, quantity: str) -> Iterator[Calls]:

@@ -1,10 +1,12 @@
-"""Generate C code for one robot, frame and quantity; the code's speed is an upper limit for a general kernel.
+"""Generate C code for one robot, one frame and one quantity.
 
-CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
-and 1. Each number is a SIMD vector of doubles: several configurations are computed together (`generated.c`).
-The time includes sine, cosine and the transposition of the arrays. The code does not check its inputs: a
-non-finite number, or an angle of a million turns, gives a wrong result. urdfkin corrects the last digit of
-sine and cosine, and this code does not.
+The benchmark compares the speed of urdfkin's kernels, which compute any robot, with the speed of this code.
+CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
+constants, and omits products with 0 and 1. The code computes several configurations together: each number is
+a SIMD vector of doubles (`generated.c`). The time includes sine, cosine and the transposition of the arrays.
+
+The code does not check inputs. A non-finite number, or an angle of a million turns, gives a wrong result.
+urdfkin corrects the last digit of sine and cosine. The generated code does not correct this digit.
 """
 
 import ctypes
@@ -40,17 +42,18 @@ _Z = (0.0, 0.0, 1.0)
 def frame_results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
+    """Return the numbers of a frame's Jacobian or acceleration in world axes, row by row.
 
-    Each joint has one coordinate. The arguments may be any numbers that the functions of `eq` accept.
+    The Jacobian uses equation 7.85. The acceleration uses equations 7.127 to 7.130. Each joint has one
+    coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
-    for i, (kind, _, place) in enumerate(plan.steps.tolist()):
+    for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):
         R, d = _pose(plan.geometry[i])
         state = recursion.rotate_frame(recursion.translate_frame(state, d), R)
-        turns = JointMotion(kind) is JointMotion.REVOLUTE
-        columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
-        if turns:
+        is_revolute = JointMotion(kind) is JointMotion.REVOLUTE
+        columns.append(Column(eq.rotate(state.R, _Z), is_revolute, state, i, velocity_index, 1.0))
+        if is_revolute:
             S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
             state = recursion.after_revolute(state, _Z, S, v[i], a[i])
         elif JointMotion(kind) is JointMotion.PRISMATIC:
@@ -81,13 +84,16 @@ def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
-    """Return a function of the batch size and the addresses of q, v, a and the results."""
+    """Compile the C code, and return its function.
+
+    The function's arguments are the batch size and the addresses of the arrays q, v, a and `out`.
+    """
     plan, folder = workload.plan, workload.folder
-    turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
+    is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
     tables = {
         "Q_AT": plan.steps[:, StepField.Q],
         "V_AT": plan.steps[:, StepField.V],
-        "TURNS": turns.astype(int),
+        "TURNS": is_revolute.astype(int),
     }
     macros = {
         **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": workload.result_size(quantity)},
@@ -95,7 +101,9 @@ def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
         **{name: _join(getattr(python_numbers, name)) for name in ("SINE", "COSINE")},
     }
     lines = [f"#define {name} {value}" for name, value in macros.items()]
-    lines += [f"static const int {name}[] = {{{_join(at.tolist())}}};" for name, at in tables.items()]
+    lines += [
+        f"static const int {name}[] = {{{_join(indices.tolist())}}};" for name, indices in tables.items()
+    ]
     lines.append(_generate_code(plan, quantity))
     (folder / f"{quantity}.h").write_text("\n".join(lines), "utf-8")
     library = folder / f"{quantity}.so"
@@ -111,7 +119,7 @@ def _join(numbers: Sequence[float]) -> str:
 
 
 def _generate_code(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code of a function of (x, sines, cosines, v, a) for one configuration."""
+    """Return CasADi's C code for one configuration. The inputs are x, sines, cosines, v and a."""
     import casadi
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]

@@ -23,7 +23,7 @@ from urdfkin.robot import Robot
 ROOT = Path(__file__).parents[2]
 #: Keys of the times of a first call: with an empty kernel cache, and with all kernels in the cache.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Number of inputs (q, v, a) of each quantity whose first call compiles a kernel.
+#: Methods whose first call compiles a kernel. Each value is the number of inputs among q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -99,14 +99,15 @@ def _measure_peak(robot: str, frame: str, quantity: str, count: str, kind: str) 
     with Workload(robot, frame, n) as workload:
         method, inputs = getattr(workload.robot, quantity), workload.inputs(quantity, n)
         out = np.ones((n, *workload.result_shape(quantity))) if kind == "out" else None
-        few = tuple(x[:64] for x in inputs)
+        warm_up_inputs = tuple(x[:64] for x in inputs)
         with use_only("compiled"):
-            method(*few, frame, verify=False, threads=2)  # This call loads compiled code and starts threads.
+            # This call loads compiled code and starts threads.
+            method(*warm_up_inputs, frame, verify=False, threads=2)
         Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
         before = _read_bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
-        taken = _read_bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
-    sizes = {"output_bytes": result.nbytes, "peak_bytes": taken}
+        peak = _read_bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
+    sizes = {"output_bytes": result.nbytes, "peak_bytes": peak}
     return {"robot": robot, "quantity": quantity, "n": n, "out": kind == "out", **sizes}
 
 

@@ -1,7 +1,7 @@
 """Count the additions and multiplications for one configuration, with numbers that record their operations.
 
 A fused multiply-add counts as two operations, as in the stated peak performance of a machine. A change of
-sign and a product with a known 0 or 1 do not count.
+sign and a product with the constant 0 or 1 do not count.
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number without a value. It stores the numbers from which it is computed.
+    """A number without a value. `operands` are the operands of the operation that yields the number.
 
-    `constant` is the value of a constant 0 or 1, and None for all other numbers.
+    `constant` is 0 or 1 if the number is a constant with this value. For all other numbers, `constant` is
+    None.
     """
 
     constant: int | None = None
-    #: If true, no result needs the number. Operations with such a number are not counted.
+    #: True if the results do not depend on this number. Operations with an unused number are not counted.
     unused: bool = False
     operands: tuple[Number, ...] = ()
 
@@ -71,7 +72,7 @@ class Number:
 
 
 def count_shared(results: Any) -> int:
-    """Return the number of operations that compute these results; a shared operation counts once."""
+    """Return the number of operations that compute the results. A shared operation counts once."""
     waiting, visited = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -128,10 +129,10 @@ def count_operations(plan: CompiledTree, quantity: str) -> int:
     angles = (words[ProgramHeader.ANGLES_END] - words[ProgramHeader.ANGLES]) // 4
     output = {"jacobian": "placement"}.get(quantity, quantity)
     state = getattr(run.call, f"mask_for_{output}")(run.state)
-    total, at = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
-    while words[at] != Op.END:
-        total += _count_instruction(run, words[at : at + INSTRUCTION_WIDTH], quantity, state)
-        at += INSTRUCTION_WIDTH
+    total, position = angles * _SINE_COSINE, int(words[ProgramHeader.CODE])
+    while words[position] != Op.END:
+        total += _count_instruction(run, words[position : position + INSTRUCTION_WIDTH], quantity, state)
+        position += INSTRUCTION_WIDTH
     return total
 
 

@@ -1,4 +1,4 @@
-"""Plot the times of all contenders, and the growth of urdfkin's time with joints and with batches."""
+"""Plot the times of all contenders, and urdfkin's time for several numbers of joints and batch sizes."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ Entry = Mapping[str, Any]
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
-        figure = new_figure(11.0, 12.0)  # The longest contender's name fits into this width.
+        figure = new_figure(11.0, 12.0)  # The longest name of a contender fits into this width.
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])
@@ -74,7 +74,7 @@ def _draw_bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
     axes.set_title(f"{robot}, {TITLES[quantity]}: time for one configuration", loc="left", fontsize=12)
 
 
-def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str) -> None:
+def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, unit: str) -> None:
     for quantity, (mark, line) in MARKS.items():
         chosen = [row for row in _select_rows(rows, section, quantity) if row["label"].startswith("urdfkin")]
         sizes = [row["size"] for row in chosen]
@@ -87,7 +87,7 @@ def _draw_growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one
     axes.set_ylim(0.0, 1.1 * max(float(axes.dataLim.y1), 1.0) if rows else None)
     axes.set_xlabel(label)
     axes.set_ylabel("time [ns]")
-    axes.set_title(f"urdfkin, 1 thread: time for one {one}", loc="left", fontsize=12)
+    axes.set_title(f"urdfkin, 1 thread: time for one {unit}", loc="left", fontsize=12)
     axes.legend(frameon=False)
 
 

@@ -1,4 +1,7 @@
-"""Measure the sections of the benchmark; before each measurement, all results are compared."""
+"""Measure the sections of the benchmark.
+
+Before each measurement, the results of all contenders are compared.
+"""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,14 +40,15 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 
 
 def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
+    """Measure the times of Jacobians and accelerations, and compare the results with Pinocchio's results.
 
-    The section `batch` measures batches, and `single` measures calls for one configuration. The section
-    `checked` measures urdfkin's calls for one configuration with a check of each result. The section
-    `verified` measures batches with a check of all results, of a sample of the results, or of no result.
+    The section `batch` measures batches of all contenders. The section `single` measures calls of all
+    contenders for one configuration. The sections `checked` and `verified` measure urdfkin and Pinocchio. In
+    the section `checked`, urdfkin computes one configuration per call, and checks each result. In the section
+    `verified`, urdfkin computes batches, and checks all results, a sample of the results, or no result.
     """
     for workload, quantity, table in _open_workloads(section, n):
-        what = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
+        title = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
         calls = pinocchio_calls(workload.urdf, workload.frame, quantity)
         loop = calls.make_batch_task(workload, quantity)
         if section == "batch":
@@ -52,14 +56,14 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
             loop = next(task for task in tasks if task.label == PROCESSES)
             baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "single":
-            found = [
-                one for contender in contenders for one in contender.make_single_calls(workload, quantity)
+            single_calls = [
+                call for contender in contenders for call in contender.make_single_calls(workload, quantity)
             ]
-            tasks = [one.make_single_task(workload, quantity) for one in found]
+            tasks = [call.make_single_task(workload, quantity) for call in single_calls]
             baseline = next(task for task in tasks if task.label == LOOP)
         elif section == "checked":
             checked = urdfkin_calls(workload, quantity, verify=True)
-            tasks = [one.make_single_task(workload, quantity) for one in (*checked, calls)]
+            tasks = [call.make_single_task(workload, quantity) for call in (*checked, calls)]
             baseline = tasks[-1]
         else:
             baseline = loop = replace(loop, label=STORED)
@@ -72,7 +76,7 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
                 tasks.append(
                     replace(all_joints_calls(workload).make_batch_task(workload, quantity), label=ALL_JOINTS)
                 )
-        check_agreement(tasks, loop, what)
+        check_agreement(tasks, loop, title)
         clock = time.perf_counter if section in ("batch", "single") else time.thread_time
         yield from measure_rows(table, tasks, rounds, baseline, clock)
 
@@ -145,11 +149,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# The time of a step of a batch is the difference between the times of two kernels.
-# Only one of these kernels has the step's instructions.
-# For one configuration, the benchmark also measures calls that do only a part of the work.
-# An example is a call with a rejected argument.
-# The time of a step is a difference of these measured times.
+# For a batch, the benchmark measures one kernel for each number k of steps.
+# The kernel executes the instructions of the first k steps.
+# The time of step k is the difference between the times of the kernels for k and k - 1 steps.
+# For one configuration, the benchmark measures calls that do only a part of the work.
+# An example is a call that rejects the argument `out`.
+# The time of a step is computed from the differences between the times of these calls.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -171,10 +176,10 @@ def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         ]
         if quantity == "acceleration":
             tasks = [task for task in tasks if task.label != "columns"]
-        found = measure_times(tasks, rounds)
+        times = measure_times(tasks, rounds)
         before, parts = np.zeros(rounds), {}
-        for label, taken in found.items():
-            parts[label], before = taken - before, taken
+        for label, total in times.items():
+            parts[label], before = total - before, total
         yield _make_entry("batch", workload, quantity, parts, before)
 
 
@@ -249,7 +254,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # A line without a call measures the time of the loop.
+        "q",  # This line calls no function, so the measured time is the time of the loop.
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
         "empty(shape)",

@@ -17,7 +17,8 @@ Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: Title and row format of the sections that vary the number of joints, frames or configurations.
+#: Sections with measurements for several numbers of joints, frames or configurations.
+#: Each section has a title, and a function that returns the cells of a row.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -52,7 +53,7 @@ _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text; each entry of `cells` maps the headings to the cells of a row."""
+    """A table as text. Each element of `cells` is a row: a mapping from headings to cells."""
 
     section: str
     title: str
@@ -91,25 +92,28 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
         yield TextTable(
             "summary",
             "urdfkin against the others, medians",
-            [_compare_with_best(*one) for one in _group_rows(batch)],
+            [_compare_with_best(*group) for group in _group_rows(batch)],
         )
-        title = "lower limits of the time for one configuration, by memory and by arithmetic"
+        title = "bytes and operations for one configuration"
         yield TextTable(
-            "floor", title, [_compare_with_limits(*one, figures["operations"]) for one in _group_rows(batch)]
+            "floor",
+            title,
+            [_compare_with_limits(*group, figures["operations"]) for group in _group_rows(batch)],
         )
-    for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
+    for kind, description in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
-            yield _make_step_table(f"{what}: where the time goes, ns for one configuration", chosen)
+            yield _make_step_table(f"{description}: where the time goes, ns for one configuration", chosen)
     if entries := figures.get("first"):
         heads = {"without stored kernels": EMPTY, "with stored kernels": STORED}
         times = [
-            {"": one["what"], **{head: format_number(one[key] / 1e3) for head, key in heads.items()}}
-            for one in entries
+            {"": entry["what"], **{head: format_number(entry[key] / 1e3) for head, key in heads.items()}}
+            for entry in entries
         ]
         yield TextTable("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # Rows are grouped by quantity, then by contender; groups are in the order of their first rows.
+            # Rows are grouped by quantity, then by contender.
+            # Groups are in the order of their first rows.
             keys = [(row["quantity"], row["label"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["label"])))
@@ -120,7 +124,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
 
 
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the figures inserted; raise ValueError if a place is missing or occurs twice."""
+    """Insert the figures into the page. Raise ValueError if a place is missing or occurs twice."""
     parts: dict[str, list[str]] = {"machine": [format_machine(figures)]}
     for words in make_tables(figures):
         parts.setdefault(words.section, []).append(words.text)
@@ -149,8 +153,8 @@ def _group_rows(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 
 def _make_contender_table(section: str, title: str, rows: list[Entry]) -> TextTable:
     cost, single = section in ("checked", "verified"), section in ("single", "checked")
-    what = "calls" if single else "results stored" if cost else "loop"
-    ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {what}"
+    baseline = "calls" if single else "results stored" if cost else "loop"
+    ratio = f"{'cost' if cost else 'speed'} relative to Pinocchio's {baseline}"
     remarks = list(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     ceiling = _generated_time(rows)
     cells = [
@@ -174,27 +178,29 @@ def _generated_time(rows: Sequence[Entry]) -> float | None:
 
 
 def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
-    """Compare urdfkin, with one thread and with all threads, with the fastest other contender."""
+    """Compare urdfkin with Pinocchio's loop, with the generated code and with the fastest other library."""
     rows = {row["label"]: row for row in group}
     several = next((row for row in group if _SEVERAL.fullmatch(row["label"])), None)
-    one, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
+    one_thread_ns, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
     others = [row for row in group if not row["label"].startswith(("urdfkin", FLOOR, GENERATED))]
     best = min(others, key=lambda row: float(row["median_ns"]))
     compiled = format_number(rows[COMPILED]["ratio"]) if COMPILED in rows else "not measured"
     return {
         "": title,
-        "1 thread, ns": format_number(one),
+        "1 thread, ns": format_number(one_thread_ns),
         "speed relative to Pinocchio's loop": format_number(rows[ONE]["ratio"]),
         "relative speed with all threads": format_number(several["ratio"]) if several else "one processor",
         "relative speed compiled for this robot, 1 thread": compiled,
-        _SHARE: format_number(ceiling / one) if ceiling else "not measured",
+        _SHARE: format_number(ceiling / one_thread_ns) if ceiling else "not measured",
         "fastest other library, ns": f"{best['label']}, {format_number(best['median_ns'])}",
-        "speed of urdfkin, 1 thread, relative to this library": format_number(best["median_ns"] / one),
+        "speed of urdfkin, 1 thread, relative to this library": format_number(
+            best["median_ns"] / one_thread_ns
+        ),
     }
 
 
 def _compare_with_limits(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
-    """Compare urdfkin's time with two lower limits: to write the output, and to do the arithmetic."""
+    """Return urdfkin's time, the time to write the output, and the bytes and operations per nanosecond."""
     rows = {row["label"].partition(",")[0]: row for row in reversed(group)}
     fill, ns = rows[FLOOR], rows["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]

@@ -23,7 +23,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class TimedTask:
-    """A timed task; `compute` uses the first `n` configurations of the workload."""
+    """A timed task. One call of `compute` computes the first `n` configurations of the workload."""
 
     label: str
     n: int
@@ -60,8 +60,11 @@ class DifferenceError(Exception):
     """The results of contenders differ, so their times are not comparable."""
 
 
-def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str) -> None:
-    """Compute all results once as a warm-up; raise DifferenceError if one differs from `reference`."""
+def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str) -> None:
+    """Compute all results once as a warm-up.
+
+    Raise DifferenceError if the result of a task differs from the result of `reference`.
+    """
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -74,17 +77,17 @@ def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, what: str)
         n = min(len(ours), len(expected))
         ours, theirs = ours[:n], expected[:n]
         if ours.shape != theirs.shape:
-            raise DifferenceError(f"{what}: {task.label} has the shape {ours.shape}, not {theirs.shape}")
+            raise DifferenceError(f"{title}: {task.label} has the shape {ours.shape}, not {theirs.shape}")
         if not np.allclose(ours, theirs, rtol=0.0, atol=task.tolerance):
             worst = float(np.abs(ours - theirs).max())
-            raise DifferenceError(f"{what}: {task.label} and {reference.label} differ by {worst:.3g}")
+            raise DifferenceError(f"{title}: {task.label} and {reference.label} differ by {worst:.3g}")
 
 
 def measure_times(
     tasks: Sequence[TimedTask], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
     """Return the times (ns) for one configuration, one for each round."""
-    found: dict[str, list[float]] = {task.label: [] for task in tasks}
+    times: dict[str, list[float]] = {task.label: [] for task in tasks}
     shuffled, order = list(tasks), random.Random(0)
     gc.disable()
     try:
@@ -94,10 +97,10 @@ def measure_times(
                 task.compute()
                 begin = clock()
                 task.compute()
-                found[task.label].append((clock() - begin) / task.n * 1e9)
+                times[task.label].append((clock() - begin) / task.n * 1e9)
     finally:
         gc.enable()
-    return {label: np.array(values) for label, values in found.items()}
+    return {label: np.array(values) for label, values in times.items()}
 
 
 def measure_rows(
@@ -108,15 +111,15 @@ def measure_rows(
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
     """Measure tasks that have already run once, so that their kernels are compiled."""
-    found = measure_times(tasks, rounds, clock)
-    medians = {label: float(np.median(values)) for label, values in found.items()}
+    times = measure_times(tasks, rounds, clock)
+    medians = {label: float(np.median(values)) for label, values in times.items()}
     return [
         replace(
             table,
             label=task.label,
             n=task.n,
             median_ns=round(medians[task.label], 3),
-            minimum_ns=round(float(found[task.label].min()), 3),
+            minimum_ns=round(float(times[task.label].min()), 3),
             ratio=None if baseline is None else round(medians[baseline.label] / medians[task.label], 3),
             remark=task.remark,
         )
@@ -134,9 +137,10 @@ class Calls:
     label: str
     names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
     lines: tuple[str, ...]  # The value of the last line is the result.
-    #: Lines that write the result of configuration k into `out[k]`; None writes the value of the last line.
+    #: Lines that write the result of configuration k into `out[k]`.
+    #: If None, the value of the last line of `lines` is written into `out[k]`.
     store: tuple[str, ...] | None = None
-    #: Index in urdfkin of each coordinate of the library; None if the orders are equal.
+    #: `order[i]` is urdfkin's index of the library's coordinate i. None means that the orders are equal.
     order: list[int] | None = None
     #: Shape of one configuration's result in a batch; None means urdfkin's shape.
     shape: tuple[int, ...] | None = None
@@ -154,14 +158,14 @@ class Calls:
         return TimedTask(self.label, workload.loop, run, result, remark=self.remark)
 
     def make_loop(self) -> Callable[..., None]:
-        """Return a function that loops over a batch; it writes the results to `out`."""
+        """Return a function that loops over a batch and writes the results to `out`."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _compile_function(
             self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body
         )
 
     def make_single_task(self, workload: Workload, quantity: str) -> TimedTask:
-        """Return the timed task for single calls; their results are not stored."""
+        """Return the timed task for single calls. The timed loop does not store results."""
         inputs = [list(self._reorder(x)) for x in workload.inputs(quantity, workload.loop)]
         rows = list(_rows(inputs))
         repeat = _compile_function(self.names, "rows_", "for q, v, a in rows_:", self.lines)

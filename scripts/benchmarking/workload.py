@@ -77,9 +77,10 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """Return a URDF with only the links and joints, without mimic rules, and with equal inertias.
+    """Return a copy of a URDF without shapes and mimic rules.
 
-    Some libraries need inertias. Some libraries add a body `world`, so a link with this name is renamed.
+    All links of the copy have the same mass and inertia, because some libraries need inertias. Some libraries
+    add a body `world`, so a link or joint with this name is renamed.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))
@@ -103,14 +104,14 @@ def chain_urdf(joints: int, seed: int = 0) -> str:
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    turns = generator.uniform(-3.0, 3.0, (joints, 3))
+    rpy_angles = generator.uniform(-3.0, 3.0, (joints, 3))
 
     def text(numbers: FloatArray) -> str:
         return " ".join(repr(float(x)) for x in numbers)
 
     parts = [f'<link name="link{i:03}"/>' for i in range(joints + 1)]
     parts += [
-        f'<joint name="joint{i:03}" type="revolute"><origin xyz="0.1 0 0" rpy="{text(turns[i])}"/>'
+        f'<joint name="joint{i:03}" type="revolute"><origin xyz="0.1 0 0" rpy="{text(rpy_angles[i])}"/>'
         f'<parent link="link{i:03}"/><child link="link{i + 1:03}"/><axis xyz="{text(axes[i])}"/>'
         '<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'
         for i in range(joints)

@@ -1,11 +1,12 @@
-"""Compute the poses of a table exported as Python, in an interpreter that has the needed library.
+"""Compute the poses of Denavit-Hartenberg tables that are exported as Python code.
 
     python scripts/forms/poses.py JOBS RESULTS
 
 The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses
 for each entry of JOBS.
 
-The script does not import urdfkin, because the Robotics Toolbox may have its own environment.
+The interpreter needs the library that the code imports. The script does not import urdfkin, because the
+Robotics Toolbox may have its own environment.
 """
 
 import json
@@ -19,20 +20,20 @@ def compute_poses(form: str, text: str, q: list[list[float]]) -> list[list[list[
     scope: dict[str, Any] = {"__name__": "table"}
     exec(compile(text, form, "exec"), scope)
     if form in ("roboticstoolbox", "ets"):
-        return [scope["robot"].fkine(one).A.tolist() for one in q]
-    place = scope["placement"]
+        return [scope["robot"].fkine(configuration).A.tolist() for configuration in q]
+    placement = scope["placement"]
     if form == "sympy":
         from sympy import Float
 
-        exact = [place([Float(x, 30) for x in one]) for one in q]
+        exact = [placement([Float(x, 30) for x in configuration]) for configuration in q]
         return [[[float(x) for x in row] for row in T.tolist()] for T in exact]
     if form == "casadi":
         from casadi import DM, SX, Function
 
         symbols = SX.sym("q", len(q[0]))
-        function = Function("placement", [symbols], [place(symbols)])
-        return [DM(function(DM(one))).full().tolist() for one in q]
-    return place(q).tolist()  # type: ignore[no-any-return]
+        function = Function("placement", [symbols], [placement(symbols)])
+        return [DM(function(DM(configuration))).full().tolist() for configuration in q]
+    return placement(q).tolist()  # type: ignore[no-any-return]
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test. `result` is an element of `PASSED`, or it names the failure."""
+    """The outcome of a test. `result` is an element of `PASSED`, or the name of the failure."""
 
     result: str
     details: str = ""

@@ -28,8 +28,10 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Maximum number of frames in one call, and number of these frames that are also computed alone.
-FRAMES_PER_CALL, SINGLE_FRAMES = 12, 2
+#: Maximum number of frames in one call.
+FRAMES_PER_CALL = 12
+#: Maximum number of frames that are computed a second time, in a call for one frame.
+SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
@@ -53,11 +55,11 @@ def evaluate(case: Case) -> Outcome:
 
 
 def _evaluate(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
-    how: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
-    findings = urdfkin.check(case.data, **how)
+    options: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
+    findings = urdfkin.check(case.data, **options)
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
     try:
-        robot = urdfkin.load(case.data, **how)
+        robot = urdfkin.load(case.data, **options)
     except UrdfError as error:
         if errors:
             return Outcome("refused", errors[0].code)
@@ -84,9 +86,9 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
     if _SIZES & {finding.code for finding in findings}:
         too_large = "too large to compute, with a finding that states the reason"
     try:
-        for what, result in compute_all(robot, seed=0):
+        for computation, result in compute_all(robot, seed=0):
             if not np.isfinite(result).all():
-                return Outcome(too_large, what)
+                return Outcome(too_large, computation)
         # The certificate does not cover DH tables. A table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
@@ -112,9 +114,9 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the name and the result of each checked computation; raise MismatchError if two differ.
+    """Yield the name and the result of each checked computation.
 
-    Errors about singular representations and about paths without a table are expected.
+    Raise MismatchError if two computations of one number differ. Singular representations are skipped.
     """
     generator = np.random.default_rng(seed)
     inputs = _draw_inputs(robot, seed)
@@ -141,7 +143,10 @@ def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def compare_prepared(robot: Robot, seed: int) -> None:
-    """Compare unchecked results of a prepared frame with checked ones; raise MismatchError if one differs."""
+    """Compare unchecked results of a prepared frame with checked results of the robot's methods.
+
+    Raise MismatchError if two results differ.
+    """
     inputs = [x[0] for x in _draw_inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
@@ -186,7 +191,10 @@ def _compare_calls(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield results for several frames and configurations; raise MismatchError if single calls differ."""
+    """Yield results for several frames and configurations.
+
+    Raise MismatchError if a call for one frame or one configuration returns a different result.
+    """
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -196,9 +204,9 @@ def _compare_calls(
         yield name, every
         for frame in alone:
             batch = _compute(robot, name, inputs, frame, reference, base)
-            one = _compute(robot, name, single, frame, reference, base)
+            single_result = _compute(robot, name, single, frame, reference, base)
             _check_equal(f"{name} of several frames and of {frame!r}", every[:, frames.index(frame)], batch)
-            _check_equal(f"{name} of {frame!r} in a batch and alone", batch[1], one)
+            _check_equal(f"{name} of {frame!r} in a batch and alone", batch[1], single_result)
     for frame in alone:
         words = (frame, reference)
         rate = robot.jacobian_rate(q, v, *words, base=base)
@@ -212,23 +220,26 @@ def _compare_calls(
 def _placements_by_name(
     robot: Robot, q: FloatArray, generator: np.random.Generator
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name; urdfkin and Pinocchio look up each name independently."""
+    """Yield placements of frames by name. urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
-    own = sorted(links | joints)
-    asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
-    for i in generator.permutation(len(asked))[:TESTED_NAMES]:
+    names = sorted(links | joints)
+    prefixed_names = [f"{prefix}{name}" for name in names for prefix in ("", "link:", "joint:")]
+    for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
-            yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
+            yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
         except UnknownNameError:  # For example, `joint:x` is unknown if x is only a link.
-            if asked[i] in own:
+            if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.
-            if asked[i] not in links & joints:
+            if prefixed_names[i] not in links & joints:
                 raise
 
 
 def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield Denavit-Hartenberg tables of paths from the root without planar and floating joints."""
+    """Yield the placements that Denavit-Hartenberg tables give for the frames.
+
+    Each table describes the path from the root to a frame. Paths with a planar or floating joint are skipped.
+    """
     tree = robot.tree
     for frame in frames:
         if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):

@@ -16,7 +16,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference from MuJoCo's placements, and between the sides of an equality constraint.
+#: Relative tolerance for placements, which are compared with MuJoCo's placements.
+#: The relative tolerance for equality constraints is a thousand times as large.
 _TOLERANCE = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
@@ -38,15 +39,15 @@ class _RandomModel:
     def text(self) -> str:
         rng = self.rng
         trees = "".join(self.body(0) for _ in range(rng.randint(1, 3)))
-        words = {
+        attributes = {
             "angle": "degree" if self.degrees else "radian",
             "eulerseq": rng.choice(("xyz", "ZYX", "zxz", "XyZ")),
             "alignfree": rng.choice(("true", "false")),
             "fusestatic": rng.choice(("true", "false", "false")),
             "autolimits": rng.choice(("true", "true", "false")),
         }
-        written = [word for word in words if word == "angle" or rng.random() < 0.7]
-        compiler = " ".join(f'{word}="{words[word]}"' for word in written)
+        written = [word for word in attributes if word == "angle" or rng.random() < 0.7]
+        compiler = " ".join(f'{word}="{attributes[word]}"' for word in written)
         return (
             f'<mujoco model="m"><compiler {compiler}/>{self.defaults()}<worldbody>{trees}</worldbody>'
             f"{self.equalities()}</mujoco>\n"
@@ -63,9 +64,9 @@ class _RandomModel:
     def body(self, depth: int) -> str:
         rng = self.rng
         name, self.bodies = f"body{self.bodies}", self.bodies + 1
-        words = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
+        attributes = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
         if self.family == "mjcf-classes" and rng.random() < 0.4:
-            words.append(f'childclass="{rng.choice(_CLASSES)}"')
+            attributes.append(f'childclass="{rng.choice(_CLASSES)}"')
         kind = "joint" if rng.random() < 0.5 else "freejoint"
         align = f'align="{rng.choice(("true", "false", "auto"))}"' if kind == "freejoint" else 'type="free"'
         if depth == 0 and rng.random() < (0.8 if self.family == "mjcf-free" else 0.1):
@@ -79,12 +80,12 @@ class _RandomModel:
             moments = " ".join(repr(1.0 + rng.random()) for _ in range(3))
             parts.append(f'<inertial pos="{self.vector()}" mass="1" diaginertia="{moments}"/>')
         for _ in range(rng.randint(0, 2)):
-            place = f'pos="{self.vector()}" {self.orientation()}' if rng.random() < 0.7 else ""
-            parts.append(f'<site name="site{self.sites}"{self.class_attribute()} {place}/>')
+            pose = f'pos="{self.vector()}" {self.orientation()}' if rng.random() < 0.7 else ""
+            parts.append(f'<site name="site{self.sites}"{self.class_attribute()} {pose}/>')
             self.sites += 1
         while depth < 4 and rng.random() < 0.45:
             parts.append(self.body(depth + 1))
-        return f"<body {' '.join(words)}>{''.join(parts)}</body>"
+        return f"<body {' '.join(attributes)}>{''.join(parts)}</body>"
 
     def class_attribute(self) -> str:
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
@@ -124,21 +125,21 @@ class _RandomModel:
         return " ".join(repr(usual_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
-        rng, made = self.rng, []
+        rng, constraints = self.rng, []
         count = rng.randint(1, 5) if self.family == "mjcf-equalities" else rng.randint(0, 1)
         for i in range(count if len(self.joints) > 1 else 0):
             first, second = rng.sample(self.joints, 2)
             c = [rng.uniform(-1.0, 1.0), rng.choice((1.0, -1.0, 0.0, rng.uniform(-3.0, 3.0))), 0.0, 0.0, 0.0]
             if rng.random() < 0.1:
                 c[rng.randint(2, 4)] = rng.uniform(-1.0, 1.0)
-            words = [f'name="equality{i}"', f'joint1="{first}"']
-            words += [f'joint2="{second}"'] if rng.random() < 0.9 else []
-            words += [f'polycoef="{" ".join(map(repr, c))}"'] if rng.random() < 0.9 else []
-            words += [f'active="{rng.choice(("true", "false"))}"'] if rng.random() < 0.4 else []
-            made.append(f"<joint {' '.join(words)}/>")
+            attributes = [f'name="equality{i}"', f'joint1="{first}"']
+            attributes += [f'joint2="{second}"'] if rng.random() < 0.9 else []
+            attributes += [f'polycoef="{" ".join(map(repr, c))}"'] if rng.random() < 0.9 else []
+            attributes += [f'active="{rng.choice(("true", "false"))}"'] if rng.random() < 0.4 else []
+            constraints.append(f"<joint {' '.join(attributes)}/>")
         if self.bodies > 1 and rng.random() < 0.2:
-            made.append('<weld name="glue" body1="body0" body2="body1"/>')
-        return f"<equality>{''.join(made)}</equality>"
+            constraints.append('<weld name="glue" body1="body0" body2="body1"/>')
+        return f"<equality>{''.join(constraints)}</equality>"
 
 
 def compile_model(data: bytes) -> mujoco.MjModel | None:
@@ -155,26 +156,38 @@ def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | Non
     """
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    warned = {one.name for one in robot.findings if one.code == "MJCF101" and one.element == "equality"}
+    warned = {
+        finding.name
+        for finding in robot.findings
+        if finding.code == "MJCF101" and finding.element == "equality"
+    }
     for q in robot.sample(3, seed=seed):
         data.qpos[:] = model.qpos0
-        for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
+        for joint, q_start in zip(robot.tree.joints, robot.tree.q_index, strict=True):
             if joint.kind is JointKind.FIXED:
                 continue
-            to, rule = int(model.joint(joint.name).qposadr[0]), joint.mimic
+            qpos_start, rule = int(model.joint(joint.name).qposadr[0]), joint.mimic
             if joint.kind is JointKind.FLOATING:
-                data.qpos[to : to + 7] = [*q[at : at + 3], q[at + 6], *q[at + 3 : at + 6]]
+                data.qpos[qpos_start : qpos_start + 7] = [
+                    *q[q_start : q_start + 3],
+                    q[q_start + 6],
+                    *q[q_start + 3 : q_start + 6],
+                ]
             else:
-                data.qpos[to] = q[at] if rule is None else rule.multiplier * q[at] + rule.offset
+                data.qpos[qpos_start] = (
+                    q[q_start] if rule is None else rule.multiplier * q[q_start] + rule.offset
+                )
         mujoco.mj_fwdPosition(model, data)
         large = 10.0 + float(np.abs(data.qpos).max(initial=0.0)) + float(np.abs(model.qpos0).max(initial=0.0))
         for kind, count in (("body", model.nbody), ("site", model.nsite)):
             for i in range(1 if kind == "body" else 0, count):
-                one = getattr(data, kind)(i)
-                T = robot.placement(q, LinkFrame.of(one.name))
-                off = max(np.abs(T[:3, 3] - one.xpos).max(), np.abs(T[:3, :3].ravel() - one.xmat).max())
-                if off > _TOLERANCE * large:
-                    return f"{one.name} is off by {off:.3g}"
+                mj_object = getattr(data, kind)(i)
+                T = robot.placement(q, LinkFrame.of(mj_object.name))
+                error = max(
+                    np.abs(T[:3, 3] - mj_object.xpos).max(), np.abs(T[:3, :3].ravel() - mj_object.xmat).max()
+                )
+                if error > _TOLERANCE * large:
+                    return f"{mj_object.name} is off by {error:.3g}"
         for row in np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)):
             i = int(data.efc_id[row])
             name = model.equality(i).name

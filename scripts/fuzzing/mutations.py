@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size (bytes) of a robot file of which mutants are made. Larger files are slow and are left out.
+#: Maximum size (bytes) of a file whose mutants are tested. Larger files are slow, so they are left out.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -43,7 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: `_STRUCTURE` is chosen three times as often as another family, because most other mutants are rejected.
+#: `_STRUCTURE` occurs three times, because urdfkin rejects most mutants of the other families.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -52,50 +52,50 @@ _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
 def make_mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
-    data, done = path.read_bytes(), [path.stem]
+    data, names = path.read_bytes(), [path.stem]
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        how = rng.choice(rng.choice(FAMILIES))
-        change = _change_bytes if how in _BYTES else _change_tokens if how in _TOKENS else _change_tree
-        data = change(rng, how, data)
-        done.append(how)
-    return Case(" ".join(done), data)
+        kind = rng.choice(rng.choice(FAMILIES))
+        change = _change_bytes if kind in _BYTES else _change_tokens if kind in _TOKENS else _change_tree
+        data = change(rng, kind, data)
+        names.append(kind)
+    return Case(" ".join(names), data)
 
 
-def _change_bytes(rng: random.Random, how: str, data: bytes) -> bytes:
-    at = rng.randrange(len(data) + 1)
-    match how:
+def _change_bytes(rng: random.Random, kind: str, data: bytes) -> bytes:
+    position = rng.randrange(len(data) + 1)
+    match kind:
         case "flip_a_bit":
-            flipped = bytes(byte ^ (1 << rng.randrange(8)) for byte in data[at : at + 1])
-            return data[:at] + flipped + data[at + 1 :]
+            flipped = bytes(byte ^ (1 << rng.randrange(8)) for byte in data[position : position + 1])
+            return data[:position] + flipped + data[position + 1 :]
         case "delete_bytes":
-            return data[:at] + data[at + rng.choice((1, 2, 8, 64, 512)) :]
+            return data[:position] + data[position + rng.choice((1, 2, 8, 64, 512)) :]
         case "insert_bytes":
             odd = (b"\0", b"\xff", b"\xef\xbb\xbf", b"<", b"&", b"\r")
-            return data[:at] + rng.choice((rng.randbytes(rng.randrange(1, 9)), *odd)) + data[at:]
+            return data[:position] + rng.choice((rng.randbytes(rng.randrange(1, 9)), *odd)) + data[position:]
         case "repeat_bytes":
-            end = at + rng.choice((1, 10, 100, 2000))
-            return data[:end] + data[at:end] * rng.choice((1, 1, 5)) + data[end:]
+            end = position + rng.choice((1, 10, 100, 2000))
+            return data[:end] + data[position:end] * rng.choice((1, 1, 5)) + data[end:]
         case "cut_off":
-            return data[:at]
+            return data[:position]
     encoding = rng.choice(("utf-16", "utf-16-le", "utf-32", "utf-8-sig"))
     return data.decode("utf-8", "replace").encode(encoding, "replace")
 
 
-def _change_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
-    if how == "prologue":
+def _change_tokens(rng: random.Random, kind: str, data: bytes) -> bytes:
+    if kind == "prologue":
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
-    pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(how, _VALUE)
+    pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(kind, _VALUE)
     # Take the first match after a random position, which is faster than finding all matches.
     starts = [rng.randrange(len(data) + 1) for _ in range(2)]
-    first, second = (pattern.search(data, at) or pattern.search(data) for at in starts)
+    first, second = (pattern.search(data, position) or pattern.search(data) for position in starts)
     if first is None or second is None:
         return data
     group = pattern.groups  # Group 2 is an attribute's value, and group 0 is the whole match.
-    if how == "swap_values":
+    if kind == "swap_values":
         if first.start() == second.start():
             return data
-        first, second = sorted((first, second), key=lambda found: found.start())
+        first, second = sorted((first, second), key=lambda match: match.start())
         middle = data[first.end(2) : second.start(2)]
         return data[: first.start(2)] + second[2] + middle + first[2] + data[second.end(2) :]
     pieces = {
@@ -103,10 +103,10 @@ def _change_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
         "odd_value": [text.encode("utf-8", "surrogatepass") for text in (*ODD_NUMBERS, *ODD_TEXTS)],
         "odd_blank": [b"\t", b"\n", b"\r\n", b"  ", b"", b"\xc2\xa0"],
     }
-    return data[: first.start(group)] + rng.choice(pieces[how]) + data[first.end(group) :]
+    return data[: first.start(group)] + rng.choice(pieces[kind]) + data[first.end(group) :]
 
 
-def _change_tree(rng: random.Random, how: str, data: bytes) -> bytes:
+def _change_tree(rng: random.Random, kind: str, data: bytes) -> bytes:
     try:
         root = ET.fromstring(data)
     except (ET.ParseError, ValueError, LookupError):
@@ -115,13 +115,13 @@ def _change_tree(rng: random.Random, how: str, data: bytes) -> bytes:
         return data
     # A file without the chosen kind of element stays unchanged.
     with contextlib.suppress(IndexError):
-        (_change_structure if how in _STRUCTURE else _change_elements)(rng, how, root)
+        (_change_structure if kind in _STRUCTURE else _change_elements)(rng, kind, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")
     return changed
 
 
-def _change_elements(rng: random.Random, how: str, root: ET.Element) -> None:
-    match how:
+def _change_elements(rng: random.Random, kind: str, root: ET.Element) -> None:
+    match kind:
         case "attribute_away":
             element = rng.choice([e for e in root.iter() if e.attrib])
             del element.attrib[rng.choice(sorted(element.attrib))]
@@ -142,11 +142,11 @@ def _change_elements(rng: random.Random, how: str, root: ET.Element) -> None:
             rng.choice(list(root.iter())).tag = rng.choice(TAGS)
 
 
-def _change_structure(rng: random.Random, how: str, root: ET.Element) -> None:
+def _change_structure(rng: random.Random, kind: str, root: ET.Element) -> None:
     first, second = ([rng.choice(root.findall(tag)) for _ in range(2)] for tag in ("link", "joint"))
     (link, other_link), (joint, other_joint) = first, second
-    named = rng.choice((first, second))
-    match how:
+    elements = rng.choice((first, second))
+    match kind:
         case "reparent":
             joint.findall(rng.choice(("parent", "child")))[0].set("link", link.get("name", ""))
         case "close_a_loop":
@@ -154,13 +154,13 @@ def _change_structure(rng: random.Random, how: str, root: ET.Element) -> None:
             ET.SubElement(loop, "parent", link=link.get("name", ""))
             ET.SubElement(loop, "child", link=other_link.get("name", ""))
         case "swap_names":
-            names = [element.get("name", "") for element in named]
-            for element, name in zip(named, reversed(names), strict=True):
+            names = [element.get("name", "") for element in elements]
+            for element, name in zip(elements, reversed(names), strict=True):
                 element.set("name", name)
         case "rename":
-            old = named[0].get("name", "")
+            old = elements[0].get("name", "")
             new = rng.choice([text for text in ODD_TEXTS if "\x00" not in text and "&" not in text])
-            named[0].set("name", new)
+            elements[0].set("name", new)
             for element, key in product(root.iter(), ("link", "joint")):
                 if element.get(key) == old:
                     element.set(key, new)
@@ -168,20 +168,20 @@ def _change_structure(rng: random.Random, how: str, root: ET.Element) -> None:
             joint.set("type", rng.choice(KINDS))
         case "mimic_added":
             multiplier = rng.choice(("0", "1", "-2.5", "1e-300", "1e300"))
-            words = {"joint": other_joint.get("name", ""), "multiplier": multiplier, "offset": "0.1"}
-            ET.SubElement(joint, "mimic", words)
+            attributes = {"joint": other_joint.get("name", ""), "multiplier": multiplier, "offset": "0.1"}
+            ET.SubElement(joint, "mimic", attributes)
         case "element_moved":
             element = rng.choice(list(root))
             root.remove(element)
             home = rng.choice([root, *root])
             home.insert(rng.randrange(len(home) + 1), element)
         case "origin_changed" | "axis_changed":
-            tag = how.removesuffix("_changed")
-            found = joint.find(tag)
-            found = ET.SubElement(joint, tag) if found is None else found
+            tag = kind.removesuffix("_changed")
+            child = joint.find(tag)
+            child = ET.SubElement(joint, tag) if child is None else child
             odd = ("0", "1e-310", "-3.5e2", "1e17", "0.1", "1", "-1", "1e-200", "1e200", "0.577")
             values = [rng.choice((*odd, repr(rng.gauss(0, 3)))) for _ in range(3)]
-            found.set(rng.choice(("xyz", "rpy") if tag == "origin" else ("xyz",)), " ".join(values))
+            child.set(rng.choice(("xyz", "rpy") if tag == "origin" else ("xyz",)), " ".join(values))
         case "limit_changed":
             limit = rng.choice(root.findall("joint/limit"))
             name = rng.choice(("lower", "upper", "effort", "velocity"))

@@ -32,7 +32,8 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
-#: Elements of other programs, which a URDF reader must not interpret as joints; {p} is a prefix.
+#: XML elements that other programs add to URDF files. {p} is a namespace prefix.
+#: A URDF reader must not read links, joints or mimic rules from these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -52,7 +53,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def format_number(rng: random.Random, x: float) -> str:
-    """Return a number, sometimes slightly changed, as text in a random notation."""
+    """Return a number as text in a random notation. Some notations round the number."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -254,16 +255,16 @@ class _RandomRobot:
         if "limits" in self.strange:
             lower, upper = odd_range(rng, kind == "revolute")
             effort = rng.choice((0.0, 1.0, 1e300, 5e-324, abs(odd_length(rng))))
-        words = [f'lower="{format_number(rng, lower)}"', f'upper="{format_number(rng, upper)}"']
+        attributes = [f'lower="{format_number(rng, lower)}"', f'upper="{format_number(rng, upper)}"']
         if kind == "continuous" or (kind not in _ONE_COORDINATE and rng.random() < 0.5):
-            words = []
+            attributes = []
         elif "limits" in self.strange and rng.random() < 0.2:
-            words.pop(rng.randrange(2))
-        words += [f'{word}="{format_number(rng, effort)}"' for word in ("effort", "velocity")]
+            attributes.pop(rng.randrange(2))
+        attributes += [f'{word}="{format_number(rng, effort)}"' for word in ("effort", "velocity")]
         if "versions" in self.strange:
             further = [name for name in FURTHER_LIMITS if rng.random() < 0.3]
-            words += [f'{name}="{odd_limit(rng)}"' for name in further]
-        return f"<limit {' '.join(words)}/>"
+            attributes += [f'{name}="{odd_limit(rng)}"' for name in further]
+        return f"<limit {' '.join(attributes)}/>"
 
     def mimic(self, i: int) -> str:
         rng = self.rng
@@ -273,12 +274,12 @@ class _RandomRobot:
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not independent_joints:
             return ""
-        words = [f"joint={quoteattr(self.joints[rng.choice(independent_joints)])}"]
+        attributes = [f"joint={quoteattr(self.joints[rng.choice(independent_joints)])}"]
         if rng.random() < 0.9:
-            words.append(f'multiplier="{format_number(rng, odd_factor(rng))}"')
+            attributes.append(f'multiplier="{format_number(rng, odd_factor(rng))}"')
         if rng.random() < 0.6:
-            words.append(f'offset="{format_number(rng, rng.choice((odd_angle, usual_angle))(rng))}"')
-        return f"<mimic {' '.join(words)}/>"
+            attributes.append(f'offset="{format_number(rng, rng.choice((odd_angle, usual_angle))(rng))}"')
+        return f"<mimic {' '.join(attributes)}/>"
 
     def foreign(self) -> str:
         if "prefixes" not in self.strange or self.rng.random() < 0.6:

@@ -27,9 +27,9 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant, which puts a new value into the list or syntax node `container`.
+    """One mutant: a new value for an element of a list or for a field of a syntax node.
 
-    `key` is an index of the list, or the name of a field of the node.
+    `container` is the list or the syntax node. `key` is the index of the element or the name of the field.
     """
 
     node: ast.AST  # The description of the mutant quotes the text of this node.
@@ -50,7 +50,10 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Change the tree in place until the end of the `with` block; yield the previous value."""
+        """Change the tree in place, and yield the previous value.
+
+        The end of the `with` block restores the tree.
+        """
         old = self.put(self.value)
         try:
             yield old
@@ -67,7 +70,7 @@ class Change:
 
 
 def list_changes(tree: ast.Module) -> list[Change]:
-    """Return all mutants of a file in a fixed order; applying a mutant changes the given tree."""
+    """Return all mutants of a file in a fixed order. Each mutant refers to nodes of the given tree."""
     return [
         change
         for node in _executed_nodes(tree)
@@ -101,22 +104,22 @@ def replace_code(source: str, function: str, before: str, after: str) -> ast.Mod
     do not matter. Raise ValueError unless `before` occurs exactly once in the function.
     """
     tree = ast.parse(source)
-    wanted = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
-    found = [
-        (node, field, at, len(texts))
+    alternatives = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
+    matches = [
+        (node, field, index, len(texts))
         for node in ast.walk(_definition(tree, function))
         for field, value in ast.iter_fields(node)
         for nodes in [value if isinstance(value, list) else [value]]
-        for texts in wanted
-        for at in range(len(nodes))
-        if [ast.unparse(x) for x in nodes[at : at + len(texts)] if isinstance(x, ast.AST)] == texts
+        for texts in alternatives
+        for index in range(len(nodes))
+        if [ast.unparse(x) for x in nodes[index : index + len(texts)] if isinstance(x, ast.AST)] == texts
     ]
-    if len(found) != 1:
-        raise ValueError(f"found {len(found)} times in {function or 'the file'}: {before}")
-    (node, field, at, size), *_ = found
+    if len(matches) != 1:
+        raise ValueError(f"found {len(matches)} times in {function or 'the file'}: {before}")
+    (node, field, index, size), *_ = matches
     old = getattr(node, field)
     if isinstance(old, list):
-        old[at : at + size] = _parse_as(after, type(old[at]))
+        old[index : index + size] = _parse_as(after, type(old[index]))
     else:
         setattr(node, field, _parse_as(after, type(old))[0])
     return ast.fix_missing_locations(tree)
@@ -132,7 +135,7 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
-    """Parse code as an expression. If the code is no expression, parse it as statements and as arguments."""
+    """Parse code as an expression, or as statements and as arguments if the code is not an expression."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
