@@ -44,7 +44,7 @@ class AllowedPaths:
 
     Attributes:
         roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
-            The target of a symbolic link must also be one of these files, or be in one of these folders.
+            The target of a symbolic link must also be in `roots` or in a folder of `roots`.
         package_folders: Folders with installed packages. A symbolic link in these folders may point to a
             package in any other folder. `colcon build --symlink-install` writes such links.
         manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
@@ -85,7 +85,10 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and no part below `root` is hidden."""
+    """Return whether `path` is `root`, or a file or folder in `root`.
+
+    Hidden files and folders in `root`, and the content of hidden folders, do not count.
+    """
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep

@@ -328,7 +328,7 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration; stop if it contains or refers to definitions."""
+        """Report a document type declaration; stop if the declaration has brackets or refers to a file."""
         self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -387,7 +387,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Clearer messages, with remedies, that replace messages of expat.
+#: A clearer message and a remedy for each of these messages of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -493,7 +493,10 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long, because converting text to a number takes quadratic time."""
+        """Report a number with more than `most` characters.
+
+        The conversion of a long text to a number takes quadratic time.
+        """
         if len(written) <= most:
             return False
         found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
@@ -696,7 +699,10 @@ class JointReader:
     def read_required(
         self, element: Element, attribute: str, example: str, *, number: bool = False
     ) -> str | None:
-        """Return a required attribute; report a missing value, and an empty value if `number` is False."""
+        """Return the value of a required attribute, and report a missing attribute.
+
+        If `number` is False, the function also reports an empty value.
+        """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"

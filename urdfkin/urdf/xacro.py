@@ -40,7 +40,10 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
 
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
-    """Return the argument names of a xacro file and its included files; None if not all are readable."""
+    """Return the argument names of a xacro file and its included files.
+
+    Return None if one of the files cannot be found or read, or if there are over `MAX_SEARCHED_FILES` files.
+    """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
         while files:
