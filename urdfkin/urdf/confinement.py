@@ -135,10 +135,10 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
             raise RefusedError(f"a xacro file may not write a file: {path!r}")
         if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
-                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
-                " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
-                " package.xml of each folder above the file, and the files and folders that an argument names"
+                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. A xacro"
+                " file may read its own folder, package and repository. Also allowed are the folders on"
+                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and the files and folders that an argument names."
+                " In the folders above the xacro file, package.xml and packages named in $(find) are allowed"
             )
 
     sys.addaudithook(refuse_forbidden)

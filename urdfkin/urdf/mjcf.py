@@ -335,9 +335,9 @@ def _has_moving_descendants(body: Any) -> bool:
 
 
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
-    what = "MuJoCo aligns the frame of this free body with its inertial frame"
+    what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += ", which depends on its shapes; urdfkin uses the frame in the file"
+        what += "; without shapes, the inertial frame is unknown, so urdfkin uses the frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 
@@ -381,7 +381,7 @@ def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
     if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
         what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
         yield MjcfRemark(
-            what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees'
+            what, "compiler", remedy='write angle="radian" in <compiler>, or convert the limits to degrees'
         )
 
 

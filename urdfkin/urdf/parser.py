@@ -339,7 +339,7 @@ class _Builder:
             return
         what = "refers to an external definition"
         if has_subset:
-            what = "has brackets [ ], which can contain definitions"
+            what = "has brackets [ ], which can define entities"
         found = quote(f"<!DOCTYPE {name} [...") if system is None else quote(system)
         message = f"the document type declaration {what}"
         remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
@@ -533,7 +533,7 @@ class NumberReader:
             element,
             attribute=attribute,
             found=quote(self.report.raw_value(element, attribute) or value),
-            remedy="write single spaces between numbers and none around them",
+            remedy="write one space between numbers, and no space before or after the numbers",
             fix=lambda: self.report.make_value_fix(element, attribute, " ".join(value.split())),
         )
 
@@ -659,7 +659,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
         return version
     else:
         rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
-        remedy = "remove the attribute unless the file uses features of the version"
+        remedy = "remove the attribute if the file uses only features of URDF 1.0"
     report.add(rule, message, root, attribute="version", found=quote(written), remedy=remedy)
     return version if version is not None and rule is NEWER_VERSION else (1, 0)
 

@@ -283,4 +283,4 @@ def _nearest_file(path: Path) -> str:
     except OSError:
         return f"the folder {path.parent} does not exist"
     close = find_similar_names(path.name, names)
-    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"
+    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists the known robots"

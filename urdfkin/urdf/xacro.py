@@ -120,9 +120,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read;"
-        " set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists the operations that a file may"
-        " do",
+        remedy="set arguments with --xacro-arg NAME:=VALUE; if VALUE is the path of a file or folder, the"
+        " xacro file may read this path; set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists"
+        " the operations that a xacro file may do",
         question=QuestionsSection.XACRO,
     )
 

@@ -101,7 +101,7 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
         yield f"{code} would remain after the fix"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
-            yield "the fixed file would not be a URDF"
+            yield "after the fix, the file would not be a URDF"
         return
     max_rotations = defaultdict[str, float](float)
     for finding in fixable:

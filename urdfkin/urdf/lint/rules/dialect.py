@@ -499,6 +499,6 @@ def check_unused_comments(report: Reporter) -> None:
             if code not in ignore.used_codes:
                 comment = ignore.comment
                 message = f"{code} is silenced, but there is no warning or note with this code here"
-                remedy = "remove the code from the comment; an error cannot be silenced"
+                remedy = f"remove {code} from the comment; a comment cannot silence an error"
                 found, position = quote(f"<!--{comment.text}-->"), (comment.line, comment.column)
                 report.add(UNUSED_COMMENT, message, found=found, remedy=remedy, position=position)

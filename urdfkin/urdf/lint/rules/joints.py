@@ -408,7 +408,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = "mimic the joint that no rule moves, because some readers apply only one rule"
+            remedy = "mimic a joint without <mimic>, because some readers apply only one rule of a chain"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
@@ -657,7 +657,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     if lower <= upper and not lower <= 0.0 <= upper:
         report.add(
             NEUTRAL,
-            "the neutral configuration, zero, is outside the limits",
+            "the limits exclude 0, the value of the joint in the neutral configuration",
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
             found=f'lower="{lower:g}" upper="{upper:g}"',
