@@ -143,7 +143,7 @@ def test_files_outside_the_robots_folder_are_not_read(
     (tmp_path / "robot" / "urdf" / "link").symlink_to(secret.parent)
     name = name.format(tmp=tmp_path)
     message = refused(expanded, link(f"${{xacro.load_yaml('{name}.yaml')['password']}}"))
-    assert "outside the allowed folders. These are the xacro file's folder" in message
+    assert "outside the allowed folders. A xacro file may read its own folder" in message
     for how in ('filename="{}.xacro"', 'filename="{}.x*"', 'filename="{}.xacro" optional="true"'):
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 
@@ -155,7 +155,7 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     message = refused(expanded, inside.replace('default=""', f'default="{secret}"'))
     for words in (
         "and the files and folders that an argument names",
-        "set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read",
+        "if VALUE is the path of a file or folder, the xacro file may read this path",
     ):
         assert words in message
     assert SECRET in expanded(inside, file=str(secret))

@@ -102,7 +102,7 @@ def _unsafe_reason(folder: Path) -> str | None:
 def _is_private(group: int) -> bool:
     """Return whether a group has the user's name and no other member.
 
-    Many systems create such a private group for each user.
+    Many systems create a private group for each user.
     """
     try:
         name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)

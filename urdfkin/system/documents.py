@@ -45,21 +45,24 @@ class Header(TypedDict):
 
     schema: Annotated[str, doc("Name and version of the layout of this document.")]
     versions: Annotated[
-        dict[str, str], doc("Version of each package: urdfkin, its libraries and the oracles.")
+        dict[str, str],
+        doc("Version by package name: Python, urdfkin, libraries of urdfkin, and oracles such as Pinocchio."),
     ]
     sha256: Annotated[
         list[Sha256 | None],
         doc(
-            "One SHA-256 digest for each robot, in the order of the robots: of the URDF's text as UTF-8, or "
-            "of the MJCF or USD file. null means that the digest is unknown."
+            "One SHA-256 digest for each robot, in the order of the robots. Each digest is computed from the "
+            "URDF text in UTF-8, or from the MJCF or USD file. null means that the digest is unknown."
         ),
     ]
     verdict: Annotated[str, doc("Verdict of the document as a whole.")]
     command: Annotated[
         str | None,
         doc(
-            "Command that makes the document again, or null if it is unknown. The robots in a line have the "
-            "same options. At most one robot in a line was given as text (`-`: standard input)."
+            "Command that makes the document again, or null if the command is unknown. If the entry contains "
+            "several commands, each command is on a line of its own. All robots of one command have the same "
+            "options. A robot that was given as text is written as `-` (standard input). A command contains "
+            "at most one `-`."
         ),
     ]
 

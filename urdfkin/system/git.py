@@ -22,7 +22,7 @@ class CommitFiles:
 
     Attributes:
         files: Git's digest of the content of each file. The key is the path of the file relative to `root`.
-        missing_names: Base names of the files of the commit that do not exist in the working tree.
+        missing_names: Names, without folders, of files that the commit contains and the working tree lacks.
     """
 
     root: Path

@@ -1,7 +1,7 @@
 """Lazy imports, versions of installed packages, and hooks.
 
-A hook is a named function that a module can call without importing the module of the function.
-`urdfkin/__init__.py` registers the hooks.
+A hook is a function that other modules call by a registered name. The calling module does not import the
+module that defines the hook. `urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def lazy_import(target: str) -> Callable[..., Any]:
 def is_instance(x: object, target: str) -> bool:
     """Return whether an object is an instance of the class `module:name`, without importing the module."""
     module, _, name = target.partition(":")
-    # Before a module is imported, no object can be an instance of a class of the module.
+    # If the module is not imported, the class has no instances.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
 
 
@@ -72,7 +72,7 @@ EXTRAS = {
 def install_command(extra: str) -> str:
     """Return the command that installs the library of an extra, such as `pip install 'viser>=1'`.
 
-    The command names the library, because no package index has urdfkin yet.
+    pip cannot install an extra of urdfkin by name, because no package index contains urdfkin yet.
     """
     return f"pip install '{EXTRAS[extra]}'"
 

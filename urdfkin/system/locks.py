@@ -19,7 +19,8 @@ def make_fork_safe_lock() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
     A fork waits until the lock is free. A fork acquires the newest lock first and the oldest lock last.
-    A thread that needs two locks must acquire them in the same order; otherwise a deadlock is possible.
+    A thread that needs two locks must acquire the newer lock before the older lock, as a fork does.
+    The opposite order can cause a deadlock.
 
     Use this function only for module variables, because this module stores each lock until the process ends.
     """
@@ -48,10 +49,10 @@ class ImportLock:
     Without this lock, another thread could fork a child during the import, and the child would wait for ever
     for the end of the import.
 
-    A fork also acquires the lock of `logging`, because `logging` requests this from Python. The import that
-    holds the import lock may need the lock of `logging`. To avoid a deadlock, a fork must acquire the import
-    lock before the lock of `logging`. Python calls registered functions in reverse order of registration, so
-    `register` imports `logging` before registering `_before_fork`.
+    A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
+    holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must
+    acquire the import lock before the lock of `logging`. Python calls registered functions in reverse order
+    of registration, so `register` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:

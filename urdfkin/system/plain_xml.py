@@ -1,6 +1,7 @@
-"""Parse XML like urdfdom, which accepts undeclared namespace prefixes; ElementTree's parser rejects them.
+"""Parse XML like urdfdom, and accept undeclared namespace prefixes.
 
-The parser of this module is independent of `urdfkin.urdf.parser`, whose results it checks.
+ElementTree's parser rejects undeclared prefixes. The parser of this module is independent of
+`urdfkin.urdf.parser`. The package `verify` uses this module to check results of `urdfkin.urdf.parser`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,10 @@ def parse_xml(text: str) -> Element:
 
 
 def joint_order_sentence(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that says whether the URDF contains its joints in the order `joints` of q."""
+    """Return a sentence that says whether the URDF has its joints in the same order as q.
+
+    `joints` contains the names of the joints in the order of q.
+    """
     known = set(joints)
     written = [e.get("name", "") for e in parse_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]

@@ -48,8 +48,8 @@ def run_python(
 ) -> tuple[bytes, int | None]:
     """Run a process with a minimal environment and a request on standard input.
 
-    The process is killed after `timeout` seconds, and after more than `max_bytes` bytes of output. Return the
-    output, cut off after `max_bytes` + 1 bytes, and the exit status. After a timeout, the status is None.
+    The process is killed after `timeout` seconds, or if the output exceeds `max_bytes` bytes. Return at most
+    `max_bytes` + 1 bytes of the output, and the exit status. After a timeout, the status is None.
     """
     import subprocess
 

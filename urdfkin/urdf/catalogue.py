@@ -7,10 +7,11 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 The folder of a package `name` is the first of these folders that exists:
 
 1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself, then `src/name`, then each `src/*/name`.
-   `src` itself is omitted unless the folder is called `name`.
+   `src` itself is a candidate only if the folder `src` is called `name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
 3. For each folder above `referring_file`: the folder itself, then its subfolder `name`.
-   The folder itself is omitted unless the folder is called `name` or its `package.xml` contains this name.
+   The folder itself is a candidate only if the folder is called `name` or contains a `package.xml` with
+   the package name `name`.
 """
 
 from __future__ import annotations
@@ -121,7 +122,7 @@ PACKAGE_PATH_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _PACKAGE_NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: Schemes of addresses that consist of a package name and a path in the package.
+#: Schemes of package addresses. A package address contains a package name and a path in the package.
 PACKAGE_SCHEMES = ("package://", "model://")
 
 

@@ -44,7 +44,7 @@ class AllowedPaths:
 
     Attributes:
         roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
-            The target of a symbolic link must also be one of these files, or be in one of these folders.
+            The target of a symbolic link must also be in `roots` or in a folder of `roots`.
         package_folders: Folders with installed packages. A symbolic link in these folders may point to a
             package in any other folder. `colcon build --symlink-install` writes such links.
         manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
@@ -85,7 +85,10 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or is below `root` and no part below `root` is hidden."""
+    """Return whether `path` is `root`, or a file or folder in `root`.
+
+    Hidden files and folders in `root`, and the content of hidden folders, do not count.
+    """
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -132,10 +135,10 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
             raise RefusedError(f"a xacro file may not write a file: {path!r}")
         if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
-                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
-                " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
-                " package.xml of each folder above the file, and the files and folders that an argument names"
+                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. A xacro"
+                " file may read its own folder, package and repository. Also allowed are the folders on"
+                " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and the files and folders that an argument names."
+                " In the folders above the xacro file, package.xml and packages named in $(find) are allowed"
             )
 
     sys.addaudithook(refuse_forbidden)

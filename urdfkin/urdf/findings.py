@@ -163,8 +163,9 @@ class Finding:
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
-            differently, so urdfkin cannot verify any result of the robot with Pinocchio.
-        other_lines: Line numbers of further findings with the same code that are combined into this finding.
+            differently. Pinocchio then cannot verify any result of the robot.
+        other_lines: Line numbers of further findings with the same code. This finding represents the further
+            findings.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -407,13 +408,14 @@ class CommentIndex:
         return None
 
 
-#: Maximum number of misspelt names in a file for which similar names are suggested.
+#: urdfkin suggests similar names for at most this number of misspelt names in a file.
 MAX_SEARCHES = 20
 #: Limits of one search for similar names: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: If a code has at least this number of warnings or notes, one finding represents all of them.
-#: `MIN_FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
+#: If a code has at least `MIN_FOLDED` warnings or notes, one finding represents all of them.
+#: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
+#: Kinematics does not use the content to which the codes URDF7xx refer.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
 #: Maximum number of errors with one code that are reported separately.
@@ -612,7 +614,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: An attribute value with a tab, a line end or a reference such as `&amp;`, which XML parsers replace.
+#: Pattern of an attribute value that contains a tab, a line end or a reference such as `&amp;`.
+#: XML parsers replace tabs, line ends and references in attribute values.
 #: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 

@@ -48,7 +48,10 @@ class XmlTree(Protocol):
 
 
 def convert_to_urdf(source: Any) -> tuple[str, str] | None:
-    """Return the URDF text of another library's object and the object's name in messages, or None."""
+    """Convert an object of yourdfpy, ElementTree or lxml to URDF text.
+
+    Return the text, and the name of the object in messages. Return None for an object of another library.
+    """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
     root = source.getroot() if hasattr(source, "getroot") else source
@@ -119,7 +122,8 @@ def _serialize(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                # The copy omits comments and processing instructions, whose tag is a function in ElementTree.
+                # The copy omits comments and processing instructions.
+                # In ElementTree, the tag of a comment or a processing instruction is a function.
                 if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
@@ -146,10 +150,11 @@ _INFINITE_LIMIT = 1e300
 
 @dataclass(frozen=True, slots=True)
 class ConvertedModel:
-    """The kinematic tree of a Pinocchio model, with the index of each link's Pinocchio joint or frame.
+    """The kinematic tree of a Pinocchio model.
 
-    `joints` contains the joint index of each link whose frame is a joint frame. `frames` contains the frame
-    index of every other link.
+    Attributes:
+        joints: By link name, the index of the Pinocchio joint whose frame is the frame of the link.
+        frames: By link name, the index of the Pinocchio frame of the link. Links in `joints` have no entry.
     """
 
     tree: KinematicTree
@@ -163,7 +168,7 @@ def is_pinocchio_model(source: object) -> TypeGuard[Any]:
 
 
 def convert_pinocchio_model(source: Any) -> ConvertedModel:
-    """Convert a `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
+    """Convert a `Model` or `RobotWrapper`; raise InputError if URDF lacks the type of a joint."""
     model = getattr(source, "model", source)
     return _ModelReader(model).convert()
 

@@ -4,9 +4,9 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 
 - Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
   connects this link with the link of the site's body.
-- The joints of a body move one after the other. Joint k has the anchor p_k and the motion J_k. It changes the
-  pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body with several
-  joints becomes a chain of joints and links. The last link of the chain is the body.
+- MuJoCo applies the joints of a body in sequence. Joint k has the anchor p_k and the motion J_k. Joint k
+  changes the pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body
+  with several joints becomes a chain of joints and links. The last link of the chain is the body.
 - The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
   MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
 
@@ -58,7 +58,7 @@ class MjcfRemark:
 
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
-        moves: Whether the part of the file affects the motion of the links.
+        moves: Whether the reported part of the file affects the motion of the links.
         remedy: The remedy if the file probably contains a mistake, otherwise None.
     """
 
@@ -74,8 +74,8 @@ class Mjcf:
 
     Attributes:
         model: MuJoCo's compiled model, in which all bodies remain separate.
-        fused_model: The model with fused static bodies; None unless `with_shapes` is True and the file sets
-            `fusestatic`.
+        fused_model: The model with fused static bodies. None if `with_shapes` is False or the file does not
+            set `fusestatic`.
         frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
         qpos_index: Index in MuJoCo's qpos of each moving joint, including mimic joints.
         mimic_equalities: Name of the mimic joint for each equality that is a mimic rule, by the equality's
@@ -99,7 +99,7 @@ class Mjcf:
     def qpos(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's qpos for urdfkin's q (n, nq).
 
-        qpos also contains the mimic joints. Its shape is (n, nq of MuJoCo's model).
+        qpos has the shape (n, `model.nq`), and also contains the values of mimic joints.
         """
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -176,8 +176,8 @@ class Mjcf:
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return one number for each frame, shape (n, frames).
 
-        The number of a body is in `at_body`, shape (n, bodies). A site has the number of its body plus the
-        site's own number in `own`, shape (sites,).
+        `at_body` contains a number for each body, shape (n, bodies). `own` contains a number for each site,
+        shape (sites,). For a site, the function adds the number of the site to the number of the site's body.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -204,7 +204,7 @@ class Mjcf:
     def rule_scales(self, q: FloatArray) -> FloatArray:
         """Return a number for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
 
-        The bound on the rounding error of a mimic rule is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
+        The rounding error of a mimic rule is at most `MJCF_RULE_ROUNDINGS` * `EPS` * the returned number.
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
@@ -305,7 +305,8 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
 def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # A confined process cannot start threads.
-    # Only dynamics needs the memory sizes in the file; -1 selects MuJoCo's default sizes.
+    # The memory sizes in the file are needed only for dynamics.
+    # The value -1 selects MuJoCo's default sizes.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
@@ -334,9 +335,9 @@ def _has_moving_descendants(body: Any) -> bool:
 
 
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
-    what = "MuJoCo aligns the frame of this free body with its inertial frame"
+    what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += ", which depends on its shapes; urdfkin uses the frame in the file"
+        what += "; without shapes, the inertial frame is unknown, so urdfkin uses the frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 
@@ -380,12 +381,12 @@ def _check_angle_unit(mujoco: Any, model: Any) -> Iterator[MjcfRemark]:
     if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
         what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
         yield MjcfRemark(
-            what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees'
+            what, "compiler", remedy='write angle="radian" in <compiler>, or convert the limits to degrees'
         )
 
 
 def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
-    """Remove elements that kinematics does not need, so that mesh files may be missing."""
+    """Remove elements that kinematics does not need, so that MuJoCo reads no mesh files."""
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for one in list(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
@@ -396,7 +397,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # The next loop replaces all inertias. MuJoCo must not align a frame with such an inertia.
+        # The next loop replaces all inertias by placeholders.
+        # MuJoCo must not align the frame of a body with a placeholder.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -472,9 +474,9 @@ class _MjcfReader:
             self._add_fixed_joint(T, here, link)
 
     def _make_joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return the joint with index `j`, and the pose of its body in the joint frame.
+        """Return the joint with index `j`, and the pose of the joint's body in the joint frame.
 
-        T is the joint's origin without the joint's reference value.
+        T is the pose of the joint frame in the parent link when the joint has its reference value `ref`.
         """
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])

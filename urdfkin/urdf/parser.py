@@ -328,7 +328,7 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration; stop if it contains or refers to definitions."""
+        """Report a document type declaration; stop if the declaration has brackets or refers to a file."""
         self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -339,7 +339,7 @@ class _Builder:
             return
         what = "refers to an external definition"
         if has_subset:
-            what = "has brackets [ ], which can contain definitions"
+            what = "has brackets [ ], which can define entities"
         found = quote(f"<!DOCTYPE {name} [...") if system is None else quote(system)
         message = f"the document type declaration {what}"
         remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
@@ -387,7 +387,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Clearer messages, with remedies, that replace messages of expat.
+#: A clearer message and a remedy for each of these messages of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -493,7 +493,10 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long, because converting text to a number takes quadratic time."""
+        """Report a number with more than `most` characters.
+
+        The conversion of a long text to a number takes quadratic time.
+        """
         if len(written) <= most:
             return False
         found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
@@ -530,7 +533,7 @@ class NumberReader:
             element,
             attribute=attribute,
             found=quote(self.report.raw_value(element, attribute) or value),
-            remedy="write single spaces between numbers and none around them",
+            remedy="write one space between numbers, and no space before or after the numbers",
             fix=lambda: self.report.make_value_fix(element, attribute, " ".join(value.split())),
         )
 
@@ -656,7 +659,7 @@ def _read_version(report: Reporter, root: Element) -> tuple[int, int]:
         return version
     else:
         rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
-        remedy = "remove the attribute unless the file uses features of the version"
+        remedy = "remove the attribute if the file uses only features of URDF 1.0"
     report.add(rule, message, root, attribute="version", found=quote(written), remedy=remedy)
     return version if version is not None and rule is NEWER_VERSION else (1, 0)
 
@@ -696,7 +699,10 @@ class JointReader:
     def read_required(
         self, element: Element, attribute: str, example: str, *, number: bool = False
     ) -> str | None:
-        """Return a required attribute; report a missing value, and an empty value if `number` is False."""
+        """Return the value of a required attribute, and report a missing attribute.
+
+        If `number` is False, the function also reports an empty value.
+        """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"

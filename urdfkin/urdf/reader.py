@@ -43,7 +43,7 @@ def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> lis
 
 
 def find_root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
-    """Return the link without a parent; raise InputError unless there is exactly one."""
+    """Return the only link without a parent; raise InputError if no link or several links have no parent."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         found = ", ".join(sorted(roots)) or "none"

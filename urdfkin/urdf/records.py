@@ -67,7 +67,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child; only elements with children have a list, which saves memory."""
+        """Add a child. To save memory, an element without children has no list of children."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:

@@ -26,11 +26,11 @@ class Origin:
     """The arguments of `load`, and properties of the source.
 
     Attributes:
-        source: A path, a catalogue name, or `-` for standard input; `<text>`, `<bytes>` or `<file>` for a
-            source without a name.
+        source: A path, a catalogue name, or `-` for standard input. If the source has no name, the value is
+            `<text>`, `<bytes>` or `<file>`.
         table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
-        lock: Name and value (rad or m) of each locked joint, without mimic joints.
+        lock: Name and value (rad or m) of each locked joint. Mimic joints are omitted.
     """
 
     source: str
@@ -52,7 +52,10 @@ class Origin:
 
     @property
     def source_argument(self) -> str:
-        """The source for a new call of `load`; `-` (standard input) for a source without a name."""
+        """The argument with which `load` can read the source again.
+
+        If the source has no name, the argument is `-`, standard input.
+        """
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -128,7 +131,8 @@ class UrdfText:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name with which the URDF can be read again. A source without a path or name has
             the value `-`, `<text>`, `<bytes>` or `<file>`.
-        sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
+        sha256: The digest of the MJCF or USD file from which the URDF was converted. The digest is empty if
+            the URDF was not converted.
     """
 
     data: bytes
@@ -279,4 +283,4 @@ def _nearest_file(path: Path) -> str:
     except OSError:
         return f"the folder {path.parent} does not exist"
     close = find_similar_names(path.name, names)
-    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists names that need no file"
+    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists the known robots"

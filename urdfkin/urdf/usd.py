@@ -55,8 +55,8 @@ from urdfkin.urdf.sources import USD_SUFFIXES
 _MAX_LAYERS = 1_000
 #: In a USD file, a missing limit of a joint is infinity or the largest number in single precision.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
-#: A frame has shear if the cosine between two of its axes exceeds the product `_MAX_SHEAR` u n.
-#: In this product, n is the number of prims on the path of the frame's prim.
+#: A frame has shear if the cosine between two axes of the frame exceeds `_MAX_SHEAR` * u * n.
+#: The factor n is the number of prims on the path of the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has a rounding error of at most u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
@@ -65,7 +65,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: The cosine between two axes then changes by at most 4 u.
 _MAX_SHEAR = 14.0
 #: A revolute joint hardly moves if its limits are at most this angle (degrees).
-#: The finding about limits that are probably in radians omits such a joint.
+#: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
 _NEGLIGIBLE_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
@@ -73,7 +73,7 @@ _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: Words in the names of USD types and schemas that couple joints or bodies.
+#: USD types and schemas that couple joints or bodies have one of these words in their names.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
@@ -140,9 +140,10 @@ class Usd:
 
     Attributes:
         prims: Path of the prim, by link name. A link without a prim has no entry.
-        rest_poses: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
-        rest_q: (nq,) configuration of the robot in the poses `rest_poses`. Planar and floating joints are in
-            their zero configuration instead.
+        rest_poses: (n, 4, 4) poses of the prims in the world, in the order of `prims`, in m with z up.
+            UsdGeom computes the poses.
+        rest_q: (nq,) configuration of the robot in the poses `rest_poses`. For planar and floating joints,
+            `rest_q` contains the zero configuration.
         single_precision: Five numbers for each joint, by joint name. The numbers bound the effect of rounding
             to single precision:
 
@@ -337,8 +338,8 @@ class _JointPrim:
         name: At first the name of the prim; later the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in the two bodies.
-        rounding: Bounds on the displacement (m) and the rotation (rad) of the joint frame by rounding to
-            single precision.
+        rounding: Bounds on the errors of the joint frame's position (m) and orientation (rad). The cause of
+            the errors is rounding to single precision.
     """
 
     prim: Any
@@ -453,7 +454,11 @@ class _StageReader:
         return prims
 
     def _read_value(self, prim: Any, name: str) -> Any:
-        """Return the value of an attribute, or its default if the value is missing or blocked, or None."""
+        """Return the value of an attribute.
+
+        If the value is missing or blocked, return the default of the attribute. If the attribute or the
+        default does not exist, return None.
+        """
         attribute = prim.GetAttribute(name)
         if not attribute:
             return None
@@ -608,7 +613,7 @@ class _StageReader:
             return None
         kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
-        # A pose relative to the world is converted back to the up axis of the stage.
+        # A pose relative to the world has z up. `UsdJoint` contains poses with the up axis of the stage.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -623,9 +628,9 @@ class _StageReader:
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return the path of body i of a joint, the joint frame's pose (m) in the body, and two error terms.
 
-        The path is None for the world. The third value is the body's share of `_JointPrim.length_sum`. The
-        fourth value is the body's share of `_JointPrim.rounding`. Return None if the body does not exist or
-        is in a prototype of a point instancer.
+        The path is None for the world. The sum of the third values of both bodies is `_JointPrim.length_sum`.
+        The sum of the fourth values of both bodies is `_JointPrim.rounding`. Return None if the body does not
+        exist or is in a prototype of a point instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")
@@ -656,11 +661,11 @@ class _StageReader:
         return body, A, length, off
 
     def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
-        """Return bounds on the displacement (m) and the rotation (rad) of a prim relative to a body.
+        """Return bounds on the errors of a prim's position (m) and orientation (rad) relative to a body.
 
-        The cause of both is rounding to single precision. The body None is the world. If the rotation of a
-        prim is rounded, the prim rotates, and all prims below the prim also move. `length` is the sum of the
-        lengths (m) of the translations from the body to the prim. Transforms in half precision are ignored.
+        The cause of the errors is rounding to single precision. The body None is the world. An error in the
+        rotation of a prim also displaces all prims below the prim. `length` is the sum of the lengths (m) of
+        the translations from the body to the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -1174,7 +1179,7 @@ def _rounding(x: FloatArray) -> FloatArray:
 
 
 def _quaternion_rounding(xyzw: FloatArray) -> float:
-    """Bound the change (rad) of a rotation when the numbers of its quaternion are rounded.
+    """Return a bound (rad) on the error of a rotation whose quaternion is rounded to single precision.
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a

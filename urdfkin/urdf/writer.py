@@ -21,8 +21,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The file declares version 1.2
-    if a <limit> element omits an infinite limit of effort or velocity.
+    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The function does not write
+    infinite limits. If a <limit> element lacks a limit of effort or velocity, the file declares version 1.2.
     """
     version = ' version="1.2"' if any(_needs_version_1_2(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{escape_attribute(tree.name)}"{version}>']
@@ -76,7 +76,7 @@ def _write_limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
 
 
 def format_numbers(values: Iterable[float]) -> str:
-    """Write numbers with all digits that restore the same doubles."""
+    """Return numbers as text, with enough digits to restore the same doubles."""
     return " ".join(repr(float(value)) for value in values)
 
 

@@ -40,7 +40,10 @@ _COMPUTED_NAME = re.compile(r"\$[({]|[*?\[]")
 
 
 def find_arguments(path: Path, find: FindPackage) -> set[str] | None:
-    """Return the argument names of a xacro file and its included files; None if not all are readable."""
+    """Return the argument names of a xacro file and its included files.
+
+    Return None if one of the files cannot be found or read, or if there are over `MAX_SEARCHED_FILES` files.
+    """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
         while files:
@@ -117,9 +120,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read;"
-        " set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists the operations that a file may"
-        " do",
+        remedy="set arguments with --xacro-arg NAME:=VALUE; if VALUE is the path of a file or folder, the"
+        " xacro file may read this path; set the folders of packages in ROS_PACKAGE_PATH; docs/xacro.md lists"
+        " the operations that a xacro file may do",
         question=QuestionsSection.XACRO,
     )
 

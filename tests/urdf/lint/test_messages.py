@@ -35,7 +35,7 @@ MESSAGES: dict[str, tuple[str | bytes, str, str]] = {
         'the declared encoding is not UTF-8: found "US-ASCII"',
     ),
     "subset-without-definitions": (
-        arm(head="<!DOCTYPE robot []>"), "URDF106", "has brackets [ ], which can contain definitions",
+        arm(head="<!DOCTYPE robot []>"), "URDF106", "has brackets [ ], which can define entities",
     ),
     "long-material": (arm(more=f'<material name="{"m" * 10_001}"/>'), "URDF117", "name of <material> is too"),
     "quaternion-zero": (_quaternion("0 0 0 0"), "URDF513", "the quaternion is zero"),

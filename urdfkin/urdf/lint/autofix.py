@@ -10,8 +10,8 @@ urdfkin accepts a fix if three conditions hold:
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. If a line must be escaped, urdfkin therefore writes a git binary patch. A comment before this patch
-shows the escaped lines.
+lines. If a line must be escaped, urdfkin therefore writes a git binary patch. A comment before the binary
+patch shows the escaped lines.
 """
 
 from __future__ import annotations
@@ -38,13 +38,17 @@ from urdfkin.urdf.sources import UrdfText
 #: In one pass, all applied fixes belong to findings with the same code, and do not overlap.
 MAX_PASSES = 100
 
-#: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
+#: If the numbers of a unit vector are rounded to doubles, the vector rotates by at most this angle (rad).
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
 @dataclass(frozen=True, slots=True)
 class FixResult:
-    """A fixed file; `unfixed_reasons` contains the reasons, by code, why other findings were not fixed."""
+    """The text of a file after the fixes.
+
+    Attributes:
+        unfixed_reasons: For each code whose findings were not fixed, the reason.
+    """
 
     text: UrdfText
     fixed_findings: tuple[Finding, ...]
@@ -97,7 +101,7 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
         yield f"{code} would remain after the fix"
     if before.robot is None or after.robot is None:
         if before.robot is not after.robot:
-            yield "the fixed file would not be a URDF"
+            yield "after the fix, the file would not be a URDF"
         return
     max_rotations = defaultdict[str, float](float)
     for finding in fixable:
@@ -108,8 +112,8 @@ def _find_objections(before: Examination, after: Examination, fixable: list[Find
 def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each difference between two robots.
 
-    The function compares the version, the links, and the joint values that URDF readers use. `max_rotations`
-    contains the angle (rad) by which a joint origin may rotate, by joint name.
+    The function compares the version, the links, and the joint values that URDF readers use. For each joint
+    name, `max_rotations` contains the largest permitted rotation (rad) of the joint origin.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"

@@ -109,8 +109,8 @@ def examine(
 ) -> Examination:
     """Check a text; the function `check` documents the arguments.
 
-    `is_reported` returns False for a finding that must not be reported. Such findings are removed first, and
-    then the remaining findings are combined.
+    `is_reported` returns False for a finding that must not be reported. The function removes these findings
+    before it combines findings with the same code.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic

@@ -51,9 +51,10 @@ def key_of(finding: Finding, file: str) -> Key:
 
 @dataclass(slots=True)
 class Baseline:
-    """Numbers of known findings, by key; file names in the keys are relative to `root`.
+    """Known findings, counted by key.
 
-    If this run encounters a known finding, the number in `counts` decreases and `match_count` increases.
+    File names in the keys are relative to the folder `root`. If this run encounters a known finding, the
+    number in `counts` decreases and `match_count` increases.
     """
 
     counts: Counter[Key]
@@ -99,8 +100,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If there is an older baseline at `path`, copy some of its entries: those about files that exist and are
-    not in `files`.
+    If there is an older baseline at `path`, the function copies entries of the older baseline. The function
+    omits an entry if the file of the entry is in `files` or no longer exists.
     """
     counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -238,7 +239,7 @@ class FindingFilter:
     ) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the returned function once for each finding, in file order, because it counts known findings.
+        The returned function counts known findings. Call this function once for each finding, in file order.
         """
         codes = self.codes - self.settings.ignored_codes(text.label)
         known = [baseline for baseline in (self.baseline, older_findings) if baseline is not None]
@@ -266,16 +267,17 @@ def find_known_findings(
 ) -> Baseline | None:
     """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
-    An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
-    that the xacro file could include has changed. A finding about a missing mesh is new if the text contains
-    the name of a file that was deleted since the older version.
+    An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
+    If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.
+    Second, files can be deleted after the older version. If the URDF contains the name of a deleted file,
+    all findings about missing meshes are new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # If the xacro file is new, or if a file that it could include has changed, every finding is new.
+        # Every finding is new if the xacro file or a file with an includable suffix has changed.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
@@ -295,7 +297,10 @@ IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 def find_files(
     argument: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]
 ) -> list[str]:
-    """Return the sorted files that `argument` names; raise SourceError if there is none."""
+    """Return the files that `argument` names, in sorted order.
+
+    Raise SourceError if `argument` is a folder or a pattern without robot files.
+    """
     path = Path(argument)
     if argument == "-" or argument in catalogue():
         return [argument]

@@ -1,4 +1,4 @@
-"""Check inertials, shapes, materials and meshes, which kinematics does not use."""
+"""Check inertials, shapes, materials and meshes. Kinematics does not use these elements."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest mass (kg) and largest coordinate (m) of a centre of mass that are not reported.
+#: A mass above `MAX_MASS` (kg) is reported as too large.
+#: A centre of mass with a coordinate above `MAX_COORDINATE` (m) is reported as too far away.
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
-#: A mass (kg) below this number is probably a placeholder. The moments of inertia are then not checked.
+#: A nonzero mass (kg) below this number is probably a placeholder.
+#: If the mass of a body is probably a placeholder, the moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
-#: Only bodies smaller than about 0.03 mm have such small moments.
+#: Tolerance for the moments of inertia of a body, per kg of the body's mass (m^2).
+#: Only bodies smaller than about 0.03 mm have moments of inertia below this tolerance.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of moments of inertia, which exporters write with few digits.
+#: Relative rounding error of the moments of inertia in a file.
+#: Exporters write moments of inertia with few digits.
 _MOMENT_PRECISION = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

@@ -265,7 +265,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: A tag with at least this number of characters is not similar to `link` or `joint`.
+#: A tag with at least this number of characters is too long to be a misspelt `link` or `joint`.
 _MAX_TAG_LENGTH = 8
 
 
@@ -329,7 +329,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: Beginnings of tags that other rules (URDF202 and URDF112) report.
+#: Tags with these beginnings are reported by the rules URDF202 and URDF112.
 _PREFIXES_OF_OTHER_RULES = ("xacro:", "xi:include")
 
 
@@ -365,7 +365,7 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
     """Yield each namespace prefix of an element, with the name of the attribute that contains the prefix.
 
-    For a prefix of the tag, yield None instead of an attribute name.
+    If the tag of the element contains the prefix, the attribute name is None.
     """
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None
@@ -490,12 +490,15 @@ def _read_comment(report: Reporter, comment: Comment, codes: Mapping[str, str]) 
 
 
 def check_unused_comments(report: Reporter) -> None:
-    """Report codes in comments that silenced no finding. Call this after all other rules."""
+    """Report a code in a comment if the comment silenced no finding with this code.
+
+    Call this function after all other rules.
+    """
     for ignore in report.comment_index.comments:
         for code in ignore.codes:
             if code not in ignore.used_codes:
                 comment = ignore.comment
                 message = f"{code} is silenced, but there is no warning or note with this code here"
-                remedy = "remove the code from the comment; an error cannot be silenced"
+                remedy = f"remove {code} from the comment; a comment cannot silence an error"
                 found, position = quote(f"<!--{comment.text}-->"), (comment.line, comment.column)
                 report.add(UNUSED_COMMENT, message, found=found, remedy=remedy, position=position)

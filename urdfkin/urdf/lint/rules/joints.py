@@ -60,7 +60,7 @@ def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _check_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report loops and additional parent joints of a link; return True if there are none."""
+    """Report loops, and links with several parent joints. Return True if the function reports nothing."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -118,8 +118,9 @@ def _check_root(report: Reporter, robot: RobotRecord) -> bool:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
+    # If the child link of a joint does not exist, each link without a parent may be the intended child.
     if not children <= robot.links.keys():
-        return False  # Any link may be the intended child of a joint whose child is not a link.
+        return False
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -136,7 +137,7 @@ PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
 #: If the length of an axis differs from 1 by less than this number, the finding is a note.
-#: Numbers with few digits cause such differences.
+#: If the numbers of an axis have few digits, the length of the axis differs slightly from 1.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
@@ -321,10 +322,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
+#: A multiplier or an offset (rad or m) of a mimic joint above this number is reported as too large.
 MAX_MIMIC_NUMBER = 1e6
-#: If the limits of a mimic joint exclude at most this fraction of the mimicked joint's range, there is
-#: no finding URDF527. Limits are often written with few digits, and therefore exclude a small fraction.
+#: URDF527 is reported if the limits of a mimic joint exclude more than this fraction of the mimicked
+#: joint's range. Limits with few digits often exclude a small fraction of the range.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -407,7 +408,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = "mimic the joint that no rule moves, because some readers apply only one rule"
+            remedy = "mimic a joint without <mimic>, because some readers apply only one rule of a chain"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
@@ -425,7 +426,8 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # A margin for rounding errors at each end can make a range of one value empty.
+        # `restrict_range` narrows the allowed range by a rounding error at each end.
+        # A range with only one value becomes empty, so the code tests each end separately.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -443,7 +445,10 @@ class _MimicChecker:
         )
 
     def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a cycle)."""
+        """Return the combined rule of a mimic chain, and the last joint of the chain.
+
+        The last joint is None if the joint does not exist, or if the chain contains a cycle.
+        """
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.mimicked_joint, mimic.multiplier, mimic.offset)
@@ -505,11 +510,11 @@ SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 #: If a rounded multiple of pi displaces a link by more than this length (m), the finding is a warning.
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: Smaller differences (rad) between an angle and a multiple of pi are not reported.
+#: If an angle differs from a multiple of pi by at most this number (rad), the difference is not reported.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Multiples of pi. A number in a file may be reported as a rounded multiple of pi.
-#: The number must then have at least as many decimals as this table states for the multiple.
+#: Pairs of a multiple of pi and a minimum number of decimals.
+#: A number in a file with fewer decimals is not reported as a rounded form of this multiple.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -652,7 +657,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
     if lower <= upper and not lower <= 0.0 <= upper:
         report.add(
             NEUTRAL,
-            "the neutral configuration, zero, is outside the limits",
+            "the limits exclude 0, the value of the joint in the neutral configuration",
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
             found=f'lower="{lower:g}" upper="{upper:g}"',

@@ -43,7 +43,7 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements that findings mention without a name.
+#: A finding mentions an MJCF element with one of these tags by the tag alone, without a name.
 #: The key is the tag in the file, and the value is the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Pattern for the start of a prim in a USD text file.
