@@ -246,7 +246,8 @@ def calibrate(
             `poses` is None.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
-            If joint values look like degrees, `force` has no effect, and `radians` must be True.
+            If joint values look like degrees, `force` has no effect: convert the values, or pass
+            `radians=True` for values in radians.
         write_all: Whether to write all fitted parameters, including parameters that changed by less than two
             standard deviations.
 
@@ -532,7 +533,10 @@ def _verify_written(calibration: Calibration, measurements: Measurements, q: Arr
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
-            found=f"a difference of {error.max():.3g} m or rad; the rounding error is at most {bound:.3g} m",
+            found=(
+                f"a difference of {error.max():.3g} m or rad; the rounding error is at most {bound:.3g} m and"
+                f" {bound / model.chain.characteristic_length:.3g} rad"
+            ),
             remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
     return calibration.updated_urdf.new_robot.certificate()

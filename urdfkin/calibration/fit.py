@@ -9,17 +9,17 @@ lower bound, so no tolerance is needed.
 The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. An opposite
 change of the next frame then leaves the tip's pose unchanged. The frame of a prismatic joint can be shifted
 anywhere and rotated about the joint's direction. Therefore, 4 of the 6 parameters of a revolute joint are
-identifiable. For a prismatic joint, 2 of the 6 parameters are identifiable. All 6 parameters of the tip are
-identifiable (Everett, Driels and Mooring, 1987). If only positions are measured, 3 fewer parameters are
-identifiable, because the tool's orientation is unknown.
+identifiable, and 2 of the 6 parameters of a prismatic joint. All 6 parameters of the tip are identifiable
+(Everett, Driels and Mooring, 1987). If only positions are measured, 3 fewer parameters are identifiable,
+because the tool's orientation is unknown.
 
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
 has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
 projection onto the chosen columns. The length of the remainder measures how independent the column is. A
 column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
 chooses the candidate that comes first in the model's order of preference. The parameter of the chosen column
-is fitted. Without this rule for candidates, four fitted parameters of nearly parallel axes could be hundreds
-of metres. The effects of these four parameters would cancel each other.
+is fitted. Without this rule, four fitted parameters of nearly parallel axes could reach hundreds of metres,
+and their effects would cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -36,9 +36,9 @@ estimation is repeated until the estimates are constant (Foerstner's variance co
 
 A pose is an **outlier** if the statistic r_i^T (1 - H_ii)^-1 r_i is too large. If a pose is not an outlier,
 its statistic has a chi^2 distribution. The distribution has 3 degrees of freedom for a position, and 6 for a
-full pose. The probability that a data set without outliers exceeds the limit is about 1 %. One outlier can
-hide another, so each step removes only the largest outlier and fits the other poses again. The steps end when
-no outlier is left.
+full pose. In a data set without outliers, the probability that any statistic exceeds the limit is about 1 %.
+One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
+The steps end when no outlier is left.
 
 **Start values.** Before the fit, start values of base and tool are computed from the measured poses. The
 robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i

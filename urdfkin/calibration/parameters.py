@@ -65,13 +65,12 @@ class ParametricMotion(ElementaryMotion):
     """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
-        parameter: Index of the motion's parameter. The parameter of a joint's motion is the gain; None if the
-            joint has no gain.
-        joint: Index of the moving joint in the arrays of joint values; None if the motion belongs to no
-            joint.
-        sense: Sign of the angle or length. The sign is -1 if the path leads from the joint's child to the
-            joint's parent. The sign is also -1 if the table's row subtracts the joint's value. Otherwise the
-            sign is 1.
+        parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
+            joint's gain, or None if the joint has no gain.
+        joint: Index of the joint whose value is the angle or length; None if the angle or length is a
+            parameter.
+        sense: Sign of the angle or length: -1 if the path leads from the joint's child to the joint's parent,
+            or if the table's row subtracts the joint's value. Otherwise 1.
     """
 
     parameter: int | None

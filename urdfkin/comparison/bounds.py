@@ -235,7 +235,7 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (m) between each frame in A and in B, at the frame's own values `z`.
+        """Return the distances (m) between each frame of A and its match in B, at the frame's own values `z`.
 
         `z` has the shape (frames, starting points, values, variables). The result has the shape (frames,
         starting points, values).

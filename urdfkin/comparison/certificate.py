@@ -85,7 +85,7 @@ class CertifiedConversion(TypedDict):
         bool,
         doc(
             "Whether the formula contains the inverse of the pose in A. The inverse is needed if the joint's"
-            " parent in A is the joint's child in B."
+            " parent link in A corresponds to the joint's child link in B."
         ),
     ]
 

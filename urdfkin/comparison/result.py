@@ -106,8 +106,9 @@ class Interval:
 
 
 #: Value of a parameter of a joint or link.
-#: A str is a type or a name.
+#: A str is a type or a name, and a float is a limit of velocity or effort.
 #: A tuple contains the two limits of a range, several names, or the type and the value of an idle joint.
+#: A `Mimic` is a mimic rule; None means that the parameter has no value.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -869,8 +870,7 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return the differences that do not affect motion.
 
-    `single` is the relative error of a number in single precision. It is 0 if both models have double
-    precision.
+    `single` is the relative error of a number in single precision, or 0 if both models have double precision.
     """
     some = list[Difference]()
     for step in alignment.steps:
@@ -915,7 +915,7 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is a relative tolerance for limits. If both limits have absolute values below 1 (rad or m),
-    `tolerance` is an absolute tolerance. `single` is the relative error of a limit in single precision. It is
+    `tolerance` is an absolute tolerance. `single` is the relative error of a limit in single precision, or
     0 if both models have double precision. With `zero` = (sign, offset), the joint's value in B is sign *
     (value in A) + offset.
     """

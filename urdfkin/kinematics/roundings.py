@@ -88,8 +88,8 @@ sums. The standard deviation of the error is the same for an export and for urdf
 values. If an export is compared with test vectors, the error is at most 7.2 eps, which is within
 `PINOCCHIO_ROUNDINGS`.
 
-**An export in single precision.** An export in single precision has a separate bound for each number of a
-test vector. The unit is eps = 2^-23. The value of each operation and of each constant has a rounding error.
+**Single precision.** An export in single precision has a separate bound for each number of a test vector. The
+unit is eps = 2^-23. The value of each operation and of each constant has a rounding error.
 `urdfkin.export.function` multiplies each error by the derivative of the result with respect to the operation
 or constant. The bound is the sum of the absolute values of all these products. The error of one operation is
 
@@ -108,10 +108,10 @@ export in double precision. The factor 2^-52 / 2^-23 converts the bound on these
 precision. The converted bound is added to the bound of single precision. An export contains only the
 operations of the table, so this section counts all errors.
 
-**MuJoCo.** MuJoCo is the optional second oracle. MuJoCo computes the orientation as a unit quaternion. For
-each joint, MuJoCo multiplies this quaternion by the quaternion of the constant rotation and by the quaternion
-of the joint's rotation. MuJoCo normalises the joint's axis first. At each link, MuJoCo normalises the
-quaternion and converts it to a matrix. If all rounding errors have the same sign, the error is
+**MuJoCo.** The optional second oracle computes the orientation as a unit quaternion. For each joint, MuJoCo
+normalises the joint's axis. MuJoCo then multiplies the quaternion by the quaternion of the constant rotation
+and by the quaternion of the joint's rotation. At each link, MuJoCo normalises the quaternion and converts it
+to a matrix. If all rounding errors have the same sign, the error is
 
 | | MuJoCo |
 |---|---|
@@ -121,7 +121,7 @@ Together with urdfkin's error of 5.7, the bound for the difference is 27.2. `MUJ
 2.8 more than 27.2. The margin of 2.8 covers the errors of the sums over the joints. MuJoCo does not replace
 the file's axes by coordinate axes.
 
-**A mimic joint.** A mimic joint adds no rounding error. urdfkin and the oracle compute a mimic joint's angle
+**Mimic joints.** A mimic joint adds no rounding error. urdfkin and the oracle compute a mimic joint's angle
 m q + c from the same doubles m and c. Both programs round the multiplication and then the addition, so IEEE
 754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle
 combine the rules in the same order. Both programs start with the rule that refers to the independent joint.
@@ -148,7 +148,7 @@ The counts, with u = eps/2, are
 The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 for urdfkin
 and 5.1 for Pinocchio. The measurement used 1,500 matrices and reference values with 50 digits.
 
-**An MJCF equality.** An equality in an MJCF file is y - y0 = c0 + c1 (x - x0). Here x and y are the values of
+**MJCF equalities.** An equality in an MJCF file is y - y0 = c0 + c1 (x - x0). Here x and y are the values of
 two joints, with the reference values x0 and y0. The tree's mimic rules satisfy the equality up to
 
 | | |

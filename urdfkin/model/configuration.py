@@ -49,7 +49,7 @@ from urdfkin.model.tree import (
 #: Largest absolute value (rad or m) of a sampled joint value.
 #: This number replaces a missing limit, but the range of a continuous joint is -pi to pi.
 #: Bounds that require limited travel assume this distance (m) from zero for joints without limits.
-#: Such joints are prismatic, planar and floating joints.
+#: These joints are planar, floating and unlimited prismatic joints.
 #: Few linear axes of robots are longer than 10 m.
 #: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
@@ -642,8 +642,8 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     """Return random configurations (n, nq), uniform within the ranges of `coordinate_ranges`.
 
     Continuous joints take any angle. Planar and floating joints take any orientation, and positions within
-    +-2 m. A revolute or prismatic joint without limits takes values within +-10 (rad or m). A limit beyond
-    +-10 is replaced by +-10.
+    +-2 m. For a revolute or prismatic joint, +-10 (rad or m) replaces a missing limit, and a limit beyond
+    +-10.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 

@@ -480,9 +480,9 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
-        The same seed gives the same configurations. In some robots, every value of a mimicked joint exceeds
-        the limits of this joint or of its mimic joint. In this case, the configurations respect only the
-        limits of the mimicked joint. `limit_violations` then reports the mimic joint.
+        The same seed gives the same configurations. In some robots, the limits of a mimic joint allow at most
+        one value of the mimicked joint. In this case, the configurations respect only the limits of the
+        mimicked joint. `limit_violations` then reports the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -891,9 +891,10 @@ class Robot(Displayable):
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
         In LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in
-        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. Let w be the angular velocity and p' the
-        linear velocity of the frame. The linear part of the spatial acceleration is that of the classical
-        acceleration minus w x p'. J a + J-dot v does not contain the acceleration that a moving base causes.
+        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. Let p' and w be the linear and the
+        angular part of `velocity` in the same reference frame. The linear part of the spatial acceleration is
+        that of the classical acceleration minus w x p'. J a + J-dot v does not contain the acceleration that
+        a moving base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1219,11 +1220,11 @@ class Robot(Displayable):
     ) -> Enclosures:
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding. They are computed for
-        the decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of an interval
-        are doubles. Nearly always, no other double lies between the two ends. The result also states whether
-        urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each
-        joint between the root link and the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding. The inputs of these
+        equations are the decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of
+        an interval are doubles. Nearly always, no other double lies between the two ends. The result also
+        states whether urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than
+        1 ms for each joint between the root link and the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1483,13 +1484,13 @@ class Robot(Displayable):
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
-                joint's origin in the URDF. "minimal": the axis passes through the origin of the next joint,
-                or of the previous joint, if that joint is revolute. The length a between these two axes is
-                then 0.
+                joint's origin in the URDF. "minimal": the axis passes through the origin of the next joint if
+                that joint is revolute, otherwise through the origin of a revolute previous joint. The length
+                a between these two axes is then 0.
             like: A published table. The returned table has the published table's positive joint directions,
                 directions of x, and offsets along parallel axes. The first and the last joint have the
-                published table's zero positions. All other numbers come from the URDF. With `like`, the
-                arguments `flip`, `first`, `last`, `sign` and `parallel_offset` must be the defaults.
+                published table's zero positions. All other numbers come from the URDF. With `like`,
+                `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:

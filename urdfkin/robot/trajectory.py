@@ -144,7 +144,7 @@ class Trajectory:
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates_source: How v and a were obtained, such as "by central differences".
         exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a were
-            read from a file or computed by central differences.
+            read from a file or computed by central differences; see `errors`.
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
@@ -233,10 +233,10 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. Joint accelerations that the file lacks are computed by
-    central differences. If the file lacks joint velocities too, urdfkin computes velocities and accelerations
-    by central differences. Before v is computed, the angles of continuous, planar and floating joints are
-    unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report these computations.
+    Without t, the samples are one second apart. If the file has no a, or neither v nor a, urdfkin computes
+    the missing arrays by central differences. Before v is computed, the angles of continuous, planar and
+    floating joints are unwrapped. The attributes `rates_source`, `errors` and `notes` of the result report
+    these computations.
 
     Args:
         robot: The robot.
@@ -679,7 +679,7 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
     return (
         f"joint {joint.name}: its {what} after sample {k[0]}{more};"
-        " urdfkin removed this change, because the change is not a motion of the robot"
+        " urdfkin removed this change, because it is not a motion of the robot"
     )
 
 

@@ -392,7 +392,7 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first pair of revolute axes for each branch of A and each branch of B.
+    """Return the first pair of revolute axes for each pair of a branch of A and a branch of B.
 
     Each item contains the first revolute pair, the prismatic pairs before this pair, and the pairs after this
     pair. If two branches have only prismatic pairs, the last prismatic pair takes the place of the first

@@ -54,15 +54,13 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
-#: If several choices are equally good, the matcher compares later joints of each branch.
-#: Maximum number of these joints on a branch.
+#: Maximum number of later joints on a branch that the matcher compares if several choices are equally good.
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: Of two scores, the score with more agreeing links and axes is better.
 #: If both numbers are equal, the largest differences (m) of the two scores are compared.
-#: The score with the smaller difference is better if the smaller difference is small enough.
-#: The smaller difference must be less than this factor times the larger difference.
+#: A score is then better if its difference is less than this factor times the difference of the other score.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -314,8 +312,8 @@ class MechanismMatcher:
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Pair a link of A and a link of B that are different end-effector frames of two matched bodies.
 
-        The result is None in two cases. In the first case, a link of one body already matches a link of the
-        other body. In the second case, every link name of one body occurs in the other model.
+        The result is None if a link of one body already matches a link of the other body. The result is also
+        None if every link name of one body occurs in the other model.
         """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
@@ -487,8 +485,7 @@ class MechanismMatcher:
             offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # In the first case, K displaces B's axis together with all later bodies of B.
-        # In the second case, K displaces only B's axis.
+        # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
         with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:

@@ -194,8 +194,8 @@ def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
     M must keep or reverse the plane's normal. Such a motion M consists of a translation along the normal and
-    a motion in the plane. If M reverses the normal, M contains half a turn about x in addition. N contains
-    the opposite translation. If M contains half a turn, N contains the same half turn.
+    a motion in the plane. If M reverses the normal, M also contains half a turn about x. N contains the
+    opposite translation and the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -428,9 +428,8 @@ class MatchedJoints:
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
             configuration.
-        axis_a: Screw S of A's joint in the zero configuration. A joint connects two bodies. The motion exp(S
-            t) moves the body that is farther from the base. If A's joint is fixed, `axis_a` is the screw of
-            B's joint.
+        axis_a: Screw S of A's joint in the zero configuration. Of the joint's two bodies, exp(S t) moves the
+            body that is farther from the base. If A's joint is fixed, `axis_a` is the screw of B's joint.
         axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. If B's
             joint axis is displaced without B's later bodies, `axis_b` differs from `axis_a`. In all other
             cases, `axis_b` is equal to `axis_a`.
