@@ -223,7 +223,7 @@ def call_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         loop, function, refused, array, computed, prepared, method = measure_times(tasks, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
-            "call from this method to the forward recursion": refused - loop,
+            "the method's call of the forward recursion": refused - loop,
             "forward recursion": computed - refused,
             "rest of the prepared evaluator": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,

@@ -189,8 +189,10 @@ def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
         "": title,
         "1 thread, ns": format_number(one_thread_ns),
         "speed relative to Pinocchio's loop": format_number(rows[ONE]["ratio"]),
-        "relative speed with all threads": format_number(several["ratio"]) if several else "one processor",
-        "relative speed compiled for this robot, 1 thread": compiled,
+        "speed with all threads, relative to the loop": format_number(several["ratio"])
+        if several
+        else "one processor",
+        "speed of code compiled for this robot, 1 thread, relative to the loop": compiled,
         _SHARE: format_number(ceiling / one_thread_ns) if ceiling else "not measured",
         "fastest other library, ns": f"{best['label']}, {format_number(best['median_ns'])}",
         "speed of urdfkin, 1 thread, relative to this library": format_number(

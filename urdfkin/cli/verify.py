@@ -70,7 +70,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--timeout",
     type=NumberInRange(min=0, max=86400, min_open=True),
     default=10.0,
-    help="With --program: longest time for a result of the program, in seconds.",
+    help="With --program: time limit for each result, in seconds.",
 )
 @click.option(
     "--junit", type=FILE, help="Also write JUnit XML to this file, with a test case for each function."

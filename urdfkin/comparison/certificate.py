@@ -72,7 +72,10 @@ class DifferenceEntry(TypedDict):
     metres: Annotated[Size, doc("Linear part of the difference, metres; 0 without a linear part.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        doc("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
+        doc(
+            "`alone`: the joint's axis differs, but the links after the joint agree."
+            " `converted`: B's limits are in A's coordinate."
+        ),
     ]
 
 
@@ -156,7 +159,7 @@ class Confirmed(TypedDict):
     """Pinocchio's confirmation of the bounds."""
 
     state: Annotated[ConfirmationState, doc("Whether the oracle confirmed the bounds.")]
-    by: Annotated[str, doc("Name and version of the oracle; empty without a confirmation.")]
+    by: Annotated[str, doc("Name and version of the oracle; empty if the oracle did not check the bounds.")]
     configurations: Annotated[Count, doc("Number of configurations at which the oracle checked the bounds.")]
     metres: Annotated[Size, doc("Largest distance that the oracle computed, metres.")]
     reason: Annotated[str, doc("Reason why the oracle computed no distances; empty if it computed them.")]

@@ -81,7 +81,7 @@ class ReportedJoint(TypedDict):
     remaining_range: Annotated[
         ReportedRange | None,
         doc(
-            "The part of the joint's range in which all mimic joints of this joint are within their limits."
+            "The joint values for which all mimic joints of this joint are within their limits."
             " null: the joint's whole range."
         ),
     ]
@@ -278,8 +278,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong. For these results, none or exactly"
-            " two of the three pairs of libraries agree."
+            "Number of results that do not show which library is wrong: either no two libraries agree, or one"
+            " library agrees with both others, but these two disagree."
         ),
     ]
 

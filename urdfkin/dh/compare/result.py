@@ -399,7 +399,7 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
     if {(one.row, one.cell) for one in comparison.unfitted_differences} - {
         (one.row, one.cell) for one in comparison.differences
     }:
-        parts += ["", f"The table agrees without a fit if these cells change {unit}:"]
+        parts += ["", f"If these cells change {unit}, the table agrees without a fit:"]
         parts.append(_difference_table(comparison.unfitted_differences, units))
     return parts
 

@@ -287,7 +287,7 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (the default of a limit is 0)"
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits, so both limits are 0"
     if lower > upper:
         message, remedy = "the lower limit is above the upper limit", "swap the limits"
         if len(written) < 2:
@@ -408,7 +408,9 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if mimicked_joint.mimic is not None:
             message = f"the mimicked joint itself mimics {mimicked_joint.mimic.mimicked_joint!r}"
-            remedy = "mimic a joint without <mimic>, because some readers apply only one rule of a chain"
+            remedy = (
+                "name a joint that is not a mimic joint; some readers apply only one mimic rule of a chain"
+            )
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= MAX_MIMIC_NUMBER:
             self.check_range(joint, mimic, joint.limit)
