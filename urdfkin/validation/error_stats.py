@@ -49,8 +49,8 @@ class CrossCheck:
 
     Attributes:
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
-        undecided: Number of results without a majority. Either no two libraries agree, or one library agrees with
-            both others, but these two disagree.
+        undecided: Number of results without a majority. Either no two libraries agree, or one library
+            agrees with both others, but these two disagree.
     """
 
     by: str
