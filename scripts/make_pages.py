@@ -181,7 +181,7 @@ def make_accuracy_parts() -> dict[str, str]:
 
 
 def format_studies(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
-    lines = [line for study in studies.values() for line in as_json_data(make_accuracy_parts)["lines"]]
+    lines = [line for study in studies.values() for line in as_json_data(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 Each line of the tables below compares the typical errors of both libraries:
