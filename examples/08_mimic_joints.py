@@ -1,7 +1,7 @@
 """Use mimic joints: a finger that mimics another one has no coordinate.
 
-You learn that `q` contains no mimic joints. The Jacobian's column of the mimicked joint includes the motion
-of the mimic joint. `mimic=False` makes mimic joints free.
+You learn that `q` contains no mimic joints. In the Jacobian, the column of the mimicked joint includes
+the motion of the mimic joint. `mimic=False` makes mimic joints free.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
 You learn that `compare` first fits the base, the tool and the zero positions of the table. Then `compare`
-computes the largest distance between the tips of the table and of the URDF, and lists the cells that differ.
+computes the largest distance between the table's tip and the URDF's tip, and lists the cells that differ.
 """
 
 from dataclasses import replace

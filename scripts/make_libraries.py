@@ -34,7 +34,7 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Maximum error of a correct pose: of a coordinate in metres, and of an entry of the rotation matrix.
+#: Largest error of a correct pose, in each coordinate (m) and each entry of the rotation matrix.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 TOLERANCE = 1e-9
 #: Time limit (s) of the process that tests the remaining features.

@@ -70,7 +70,7 @@ class Change:
 
 
 def list_changes(tree: ast.Module) -> list[Change]:
-    """Return all mutants of a file in a fixed order. Each mutant refers to nodes of the given tree."""
+    """Return all mutants of a file in a fixed order. Applying a mutant changes the given tree."""
     return [
         change
         for node in _executed_nodes(tree)

@@ -1,8 +1,8 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`. Before the call of `eval`, xacro searches the expression for
-forbidden names, but does not search the body of a lambda. A lambda in the expression can therefore read any
-attribute, and run any program.
+xacro itself passes expressions to `eval`. Before calling `eval`, xacro searches the expression for forbidden
+names, but does not search the body of a lambda. A lambda in the expression can therefore read any attribute,
+and run any program.
 This module interprets the syntax tree of an expression. An expression may contain only values, operators, the
 functions of xacro and the methods in `_METHODS`.
 """

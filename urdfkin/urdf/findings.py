@@ -164,8 +164,7 @@ class Finding:
         name: The name of the link, joint or material, or None.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
-        other_lines: Line numbers of further findings with the same code. This finding represents the further
-            findings.
+        other_lines: Line numbers of further findings with the same code, which this finding represents.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 

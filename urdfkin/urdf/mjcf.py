@@ -337,7 +337,7 @@ def _has_moving_descendants(body: Any) -> bool:
 def _make_alignment_remark(body: str, *, with_shapes: bool) -> MjcfRemark:
     what = "MuJoCo aligns the frame of this free body with the body's inertial frame"
     if not with_shapes:
-        what += "; without shapes, the inertial frame is unknown, so urdfkin uses the frame in the file"
+        what += "; the file was read without shapes and inertias, so urdfkin uses the frame in the file"
     return MjcfRemark(what, f"body {body}" if body else "body", moves=not with_shapes)
 
 

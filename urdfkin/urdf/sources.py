@@ -131,8 +131,7 @@ class UrdfText:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name with which the URDF can be read again. A source without a path or name has
             the value `-`, `<text>`, `<bytes>` or `<file>`.
-        sha256: The digest of the MJCF or USD file from which the URDF was converted. The digest is empty if
-            the URDF was not converted.
+        sha256: The digest of the MJCF or USD file from which the URDF was converted; empty for other sources.
     """
 
     data: bytes
@@ -283,4 +282,4 @@ def _nearest_file(path: Path) -> str:
     except OSError:
         return f"the folder {path.parent} does not exist"
     close = find_similar_names(path.name, names)
-    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists the known robots"
+    return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists robots that need no file"

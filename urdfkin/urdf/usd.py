@@ -73,7 +73,7 @@ _LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 #: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: USD types and schemas that couple joints or bodies have one of these words in their names.
+#: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.

@@ -100,8 +100,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If there is an older baseline at `path`, the function copies entries of the older baseline. The function
-    omits an entry if the file of the entry is in `files` or no longer exists.
+    If there is an older baseline at `path`, its entries are copied, except entries whose file is in `files`
+    or no longer exists.
     """
     counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -239,7 +239,7 @@ class FindingFilter:
     ) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        The returned function counts known findings. Call this function once for each finding, in file order.
+        The returned function counts known findings, so call it once for each finding, in file order.
         """
         codes = self.codes - self.settings.ignored_codes(text.label)
         known = [baseline for baseline in (self.baseline, older_findings) if baseline is not None]
@@ -299,7 +299,7 @@ def find_files(
 ) -> list[str]:
     """Return the files that `argument` names, in sorted order.
 
-    Raise SourceError if `argument` is a folder or a pattern without robot files.
+    Raise SourceError if `argument` is a folder or a pattern, and no file is found.
     """
     path = Path(argument)
     if argument == "-" or argument in catalogue():

@@ -15,8 +15,8 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: A mass above `MAX_MASS` (kg) is reported as too large.
-#: A centre of mass with a coordinate above `MAX_COORDINATE` (m) is reported as too far away.
+#: A mass (kg) is reported as too large if its absolute value exceeds `MAX_MASS`.
+#: A centre of mass is reported if the absolute value of a coordinate (m) exceeds `MAX_COORDINATE`.
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
 #: A nonzero mass (kg) below this number is probably a placeholder.

@@ -322,7 +322,7 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: A multiplier or an offset (rad or m) of a mimic joint above this number is reported as too large.
+#: A mimic joint's multiplier or offset (rad or m) is too large if its absolute value exceeds this number.
 MAX_MIMIC_NUMBER = 1e6
 #: URDF527 is reported if the limits of a mimic joint exclude more than this fraction of the mimicked
 #: joint's range. Limits with few digits often exclude a small fraction of the range.
@@ -429,7 +429,7 @@ class _MimicChecker:
         if low <= high and high - low >= least:
             return
         # `restrict_range` narrows the allowed range by a rounding error at each end.
-        # A range with only one value becomes empty, so the code tests each end separately.
+        # A range with only one value can become empty, so the code tests each end separately.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -516,7 +516,7 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 NEGLIGIBLE_ANGLE = 1e-10
 
 #: Pairs of a multiple of pi and a minimum number of decimals.
-#: A number in a file with fewer decimals is not reported as a rounded form of this multiple.
+#: A number with fewer decimals is not reported as a rounded form of this multiple.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
