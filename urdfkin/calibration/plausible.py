@@ -1,12 +1,13 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. A
-smaller error is refused if the error is a large fraction of the spread of the measured positions. A smaller
-error is also refused if the fit hardly reduces the error. Other reasons for a refusal are a large orientation
-error, a large tilt of a joint's axis, a large gain, missing redundancy, and joint values that look like
-degrees. To find the mistake behind a refused fit, the module corrects common mistakes in the data, one at a
-time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
+joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. A fit
+with a smaller error is refused if the error is a large fraction of the spread of the measured positions. A
+fit is also refused if the error is hardly smaller than the error of a fit of base and tool alone. Other
+reasons for a refusal are a large orientation error, a large tilt of a joint's axis, a large gain, missing
+redundancy, and joint values that look like degrees. To find the mistake behind a refused fit, the module
+corrects common mistakes in the data, one at a time, and fits again. If the fit is plausible after a
+correction, the corrected mistake is the likeliest one.
 """
 
 from __future__ import annotations

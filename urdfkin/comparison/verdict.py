@@ -62,7 +62,7 @@ from urdfkin.verify.verifier import as_verify
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: The search for the largest distance between the unchanged models has the same maximum number of frames.
+#: The search for the largest distance between the unchanged models uses at most this number of frames.
 MAX_FARTHEST_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 MAX_PATH_LENGTH = 1e150
@@ -512,7 +512,7 @@ def _joints_fixed_in_one(
 ) -> set[int]:
     """Return the indices of the fixed joints of `tree` that are moving joints in `other`.
 
-    Joints of the two trees are the same joint if they have the same name, or child links of the same name.
+    Two joints match if the joints have equal names, or if the child links of the joints have equal names.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -717,7 +717,7 @@ class JointComparison:
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
         """Return the link's nearest ancestor P that both models have, and the joints from P to the link.
 
-        If there is no such ancestor, P is the link at which the compared paths begin.
+        If the models have no common ancestor of the link, P is the link at which the compared paths begin.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
