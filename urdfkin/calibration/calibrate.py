@@ -58,17 +58,17 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general_identification`.
 _GENERAL_CONFIGURATIONS = 40
-#: Maximum difference between the noise of the residuals and the stated noise, in standard deviations.
-#: A larger difference causes a warning.
+#: A warning is given if `Fit.noise_ratio` differs from 1 by more than this number of standard deviations.
+#: The ratio compares the residuals with the noise that the user stated.
 _NOISE_RATIO_SIGMAS = 4.0
 #: Ratio of uncertainties (`Calibration.poorly_observable`) above which a parameter is poorly observable.
 _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: Divisors that define an assumed position of the target on the tip.
-#: A coordinate (m) of this position is the sum of the model's lengths, divided by the coordinate's divisor.
-#: With these divisors, the target hardly ever lies on a joint axis.
+#: If the tool is unknown and no poses are measured, the target is assumed to be at (L/5, L/6, L/7).
+#: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
+#: A target at this position hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
 #: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
@@ -90,12 +90,12 @@ class Calibration:
         identification: The parameters that are identifiable from the measured poses.
         general_identification: The parameters that are identifiable from random poses.
         full_fit: The fit; None without poses.
-        base_tool_fit: The fit of only base and tool, with the robot's original parameters.
+        base_tool_fit: A fit of base and tool; all other parameters have their original values.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to a ratio. The numerator is the
-            parameter's uncertainty at the measured configurations. The denominator is the parameter's
-            uncertainty at the same number of random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to the ratio u_measured /
+            u_random. Here u_measured is the parameter's uncertainty at the measured configurations, and
+            u_random is the parameter's uncertainty at equally many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
@@ -242,8 +242,8 @@ def calibrate(
         noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
-        full_poses: Whether you will measure full poses, and not only positions. This argument is used only if
-            `poses` is None.
+        full_poses: True if you will measure full poses; False if you will measure positions. If `poses` is
+            given, this argument has no effect.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
             If joint values look like degrees, `force` has no effect: convert the values, or pass
@@ -300,7 +300,7 @@ def fit_model(
     write_all: bool = True,
     check: bool = True,
 ) -> Calibration:
-    """Fit as `calibrate` does, but also return implausible fits."""
+    """Return the calibration of a model, even if the fit is not plausible."""
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
@@ -341,7 +341,7 @@ def fit_model(
 def _general_target(model: CalibrationModel) -> FloatArray:
     """Return the parameters (p,) of the original model.
 
-    If the tool is fitted, the target gets another position, which hardly ever lies on a joint axis.
+    If the tool is fitted, `_TARGET_DIVISORS` defines the position of the target.
     """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):

@@ -14,12 +14,13 @@ identifiable, and 2 of the 6 parameters of a prismatic joint. All 6 parameters o
 because the tool's orientation is unknown.
 
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
-has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
-projection onto the chosen columns. The length of the remainder measures how independent the column is. A
-column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
-chooses the candidate that comes first in the model's order of preference. The parameter of the chosen column
-is fitted. Without this rule, four fitted parameters of nearly parallel axes could reach hundreds of metres,
-and their effects would cancel each other.
+has a column in the Jacobian. The remainder of a column is the column minus its projection onto the columns
+that are already chosen. A long remainder means that the column is nearly independent of the chosen columns. A
+column is a candidate if its remainder is at least half as long as the longest remainder. Each step chooses
+the candidate that comes first in the model's order of preference. The parameter of the chosen column is
+fitted. Columns with short remainders are no candidates, because fitted parameters with nearly dependent
+columns can become very large. For example, fitted lengths along nearly parallel axes could be hundreds of
+metres, and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -44,8 +45,8 @@ The steps end when no outlier is left.
 robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i
 and R_X be the rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown
 rotations R_B and R_X. The null vector of these equations contains the entries of R_B and R_X (Shah, 2013).
-Let p_i be the robot's positions. Let x be the unknown translation of the tool, and b that of the base. The
-measured positions p_Mi = R_B (R_i x + p_i) + b are linear in x and b.
+Let p_i be the positions in the robot's poses T_i. Let x be the unknown translation of the tool, and b the
+unknown translation of the base. The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in x and b.
 
 If only positions are measured, the base and the position of the target on the tip are unknown. If the
 target's position is known, the base's rotation can be computed directly. If the base's rotation is known, the
@@ -74,11 +75,11 @@ from urdfkin.verify.singular_values import singular_values
 
 #: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: Maximum number of fitted parameters that are named in the reason why another parameter stays fixed.
+#: The reason why a parameter stays fixed names at most this number of fitted parameters.
 _MAX_NAMES = 3
-#: A parameter stays fixed if a combination of fitted parameters has the same effect.
-#: A message lists the fitted parameters of this combination.
-#: The message omits a fitted parameter if its share of the effect is at most this fraction.
+#: A parameter stays fixed if fitted parameters together have the same effect on the measurements.
+#: The reason lists these fitted parameters.
+#: A fitted parameter that contributes at most this fraction of the effect is not listed.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -192,9 +193,9 @@ def join_names(names: Iterable[str], limit: int) -> str:
 #: A fit can be checked if its total redundancy is at least this number.
 #: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
 _MIN_REDUNDANCY = 0.5
-#: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
-#: Along the eigenvector of such an eigenvalue, the fitted parameters cancel a measurement error.
-#: The residuals then do not show this error.
+#: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
+#: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.
+#: The residuals do not show this error.
 _EIGENVALUE_CUTOFF = 1e-9
 #: Maximum number of estimates of the noise.
 _MAX_NOISE_ESTIMATES = 20
@@ -350,7 +351,7 @@ def fit_parameters(
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
     """Estimate the noise from the residuals.
 
-    The residuals are divided by the noise. The estimate is therefore at least the rounding error, never 0.
+    An estimate of 0 would cause a division by 0, so the estimate is at least the rounding error.
     """
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
@@ -461,7 +462,8 @@ def select_significant(
     x, C = changes.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative.
-        # `MIN_DIVISOR` then replaces the variance, so that the parameter counts as significant.
+        # `MIN_DIVISOR` replaces such a variance.
+        # The quotient is then very large, and the parameter counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], MIN_DIVISOR))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -571,7 +573,11 @@ def _translations(
 
 
 def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
-    """Raise InputError if the measured positions have more than 100 times the spread of the tip positions."""
+    """Raise InputError if the measured positions are much farther apart than the positions of the tip.
+
+    The spread of positions is the largest distance (m) of a position from the mean position. The spread of
+    the measured positions must be at most 100 times the spread of the tip's positions in the original model.
+    """
     T = model.chain.poses(measurements.joint_values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)

@@ -1,10 +1,10 @@
 """Model a path whose parameters are the URDF's origins or the table's cells, and compute its Jacobian.
 
-A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
-origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
-an elementary motion is a parameter or a joint's value. A joint can have a gain g. A joint with the value q
-then moves by the angle or length (1 + g) q. Let D be the derivative of the tip's pose by this angle or
-length. The derivative of the tip's pose by g is then q D.
+A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint
+origin of a URDF and a row of a Denavit-Hartenberg table are such products. An elementary motion is a rotation
+by an angle or a translation by a length. A parameter or the value of a joint determines the angle or length.
+A joint can have a gain g. A joint with the value q then moves by the angle or length (1 + g) q. Let D be the
+derivative of the tip's pose by this angle or length. The derivative of the tip's pose by g is then q D.
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
 directly before the tip also has six parameters. Let T be the joint's original origin, and let A be the
@@ -62,7 +62,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ParametricMotion(ElementaryMotion):
-    """A motion whose angle or length is a parameter or a joint's value.
+    """A rotation or translation by an angle or length that a parameter or a joint's value determines.
 
     Attributes:
         parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
@@ -127,8 +127,8 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        The argument `frames` is the result of the method `frames` for the same arguments. If `frames` is
-        None, `poses_and_jacobian` computes this result.
+        `frames` (s, steps, 4, 4) contains the poses that the method `frames` returns for these joint values
+        and parameters. If `frames` is None, the function computes these poses.
         """
         amounts, factors = self._displacements(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -185,10 +185,11 @@ ORIGIN_PARAMETERS = (
     ("rz", True, 2),
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
-#: Order of preference for revolute (True) and prismatic (False) joints.
-#: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
+#: Order of preference for the parameters of a revolute (True) or prismatic (False) joint.
+#: If several parameters have the same effect, the first of these parameters is fitted.
 #: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
-#: The last parameters move only the frame, or scale the joint's value (gain).
+#: Further parameters move the joint's frame, but not its axis.
+#: The last parameter is the gain, which scales the joint's value.
 _ORIGIN_PREFERENCES = {
     True: ("rz", "x", "y", "rx", "ry", "z", "gain"),
     False: ("z", "rx", "ry", "x", "y", "rz", "gain"),
@@ -212,7 +213,10 @@ class CalibrationModel:
     source: KinematicTree | DHTable
 
     def base_or_tool_pose(self, element: str, parameter_values: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of the base or tool at parameters (p,), or None if it is not fitted."""
+        """Return the pose (4, 4) of `element` ("base" or "tool"); None if this element is not fitted.
+
+        `parameter_values` (p,) contains the values of all parameters.
+        """
         if not any(
             parameter.is_base_or_tool and parameter.element == element for parameter in self.chain.parameters
         ):

@@ -1,11 +1,13 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its rms error is too large. The limits for the position error depend on
-the robot's reach, on the spread of the measured positions, and on the error before the fit. A fit is also
-refused for a large tilt of a joint's axis, a large gain, or missing redundancy. Joint values that look like
-degrees are refused too. To find the reason, the module corrects common mistakes in the data, one at a time,
-and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
+joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. A fit
+with a smaller error is refused if the error is a large fraction of the spread of the measured positions. A
+fit is also refused if the error is hardly smaller than the error of a fit of base and tool alone. Other
+reasons for a refusal are a large orientation error, a large tilt of a joint's axis, a large gain, missing
+redundancy, and joint values that look like degrees. To find the mistake behind a refused fit, the module
+corrects common mistakes in the data, one at a time, and fits again. If the fit is plausible after a
+correction, the corrected mistake is the likeliest one.
 """
 
 from __future__ import annotations
@@ -34,37 +36,43 @@ from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, Kinem
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms position error is not plausible if it exceeds both limits.
-#: The limits are a fraction of the reach, and a fraction of the spread of the measured positions.
+#: Two factors for a fit whose error is a large fraction of the spread of the measured positions.
+#: The fit is not plausible if its rms position error exceeds both limits.
+#: The first limit is the first factor times the reach.
+#: The second limit is the second factor times the rms distance of the measured positions from the mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms position error is not plausible if it exceeds both limits.
-#: The limits are a fraction of the reach, and a fraction of the rms position error before the fit.
+#: Two factors for a fit that hardly reduces the error.
+#: The fit is not plausible if its rms position error exceeds both limits.
+#: The first limit is the first factor times the reach.
+#: The second limit is the second factor times the rms position error of a fit of base and tool alone.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: If an rms error of the fit exceeds its limit, the module searches for common mistakes in the data.
-#: The position limit is a fraction of the reach, and the orientation limit is in rad.
+#: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
+#: The first limit is the rms position error, as a fraction of the reach.
+#: The second limit is the rms orientation error, rad.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
-#: Two configurations count as equal if their joint values, rounded to multiples of this number, are equal.
-#: The unit is rad or m.
+#: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
+#: Two configurations with equal rounded values count as one configuration.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a parameter's change.
 #: The remainder is compared with a limit.
 #: For this reason, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _UNCERTAIN = 5.0
-#: An accepted correction of the data multiplies the fit's error by at most this factor.
-#: The factor is `_NOT_WORSE` for a fit that is not plausible or changes a joint's zero by half a turn.
-#: The factor is `_BETTER` for any other fit.
+#: After a correction of the data, the error of the new fit is compared with the error of the original fit.
+#: The new error must be at most a factor times the original error.
+#: The factor is `_NOT_WORSE` if the original fit is not plausible, or changes a joint's zero by half a turn.
+#: For a plausible original fit with a suspiciously large error, the factor is `_BETTER`.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections of the data for which all parameters are fitted again.
-#: Before the choice, only base and tool are computed for every correction.
-#: The corrections with the smallest errors are chosen.
+#: Maximum number of corrections of one mistake after which all parameters are fitted again.
+#: For every correction, the module first computes base and tool, and the remaining error of the poses.
+#: The corrections with the smallest remaining errors are then fitted.
 _MAX_FITS = 4
-#: Possible numbers of rows by which the rows of q are shifted relative to the poses.
-#: For a positive number, the correct row of q comes later than the row of the pose.
+#: The rows of q may be shifted relative to the poses by one of these numbers of rows.
+#: The number k means that row i + k of q belongs to pose i.
 _SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
 
@@ -74,7 +82,7 @@ class Plausibility:
     """The reasons why a fit is refused.
 
     `objections` contains the reasons. `reason` names the likeliest mistake and its remedy; None if no mistake
-    is found. If `is_in_degrees` is True, `force` has no effect, and the fit is refused.
+    is found. If `is_in_degrees` is True, `calibrate` refuses the fit even with `force`.
     """
 
     objections: tuple[str, ...] = ()
@@ -156,9 +164,9 @@ class FitWithData:
             yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
     def half_turn_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn.
+        """Return the name and the change of each joint whose zero position changed by about half a turn.
 
-        If the sign of the next joint is reversed in the data, a fit can change a zero by half a turn.
+        Such a change can be the result of a wrong sign: the measured values of the next joint are negated.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -191,7 +199,7 @@ class FitWithData:
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
-    """Check whether a fit is plausible, and find the likeliest mistake if it is not."""
+    """Check whether a fit is plausible; for an implausible fit, find the likeliest mistake in the data."""
     few = fit.redundancy_objections()
     misfits = [*fit.misfit_objections(), *fit.extreme_parameter_objections()]
     like_degrees, outside = _out_of_range(fit.model, fit.q)
@@ -339,7 +347,8 @@ class _Trial:
         self.measurements = Measurements(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = estimate_start_values(model, self.measurements)
         errors_before = _norm(compute_residuals(model, self.measurements, self.start), original.reach)
-        #: Error (m) per pose if only base and tool are computed from the poses.
+        #: Rms error (m) of the poses for the start values; angles are multiplied by the reach.
+        #: Base and tool are computed from the poses, and the other parameters have their original values.
         self.error_before = errors_before / math.sqrt(len(self.measurements))
 
     @cached_property

@@ -47,11 +47,12 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's name of each order of roll, pitch and yaw.
+#: Order of the rotations by roll, pitch and yaw, in SciPy's notation.
 #: Uppercase letters mean moving axes, and lowercase letters mean fixed axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of random configurations for the fit of the origins, and for its check.
+#: Number of random configurations for the fit of the joint origins.
+#: The check of the new URDF uses the same number of configurations.
 _FIT_SAMPLES = 40
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.

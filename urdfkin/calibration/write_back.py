@@ -31,10 +31,11 @@ _ROUNDING = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
-    """Return the URDF's bytes with new joint origins; `origins` contains them (4, 4) by joint name.
+    """Write new joint origins into a URDF, and return the new bytes.
 
-    A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
-    and yaw angles; the triple nearest to the old angles is written.
+    `data` contains the original URDF. `origins` contains the new origin (4, 4) of each changed joint, by
+    joint name. A number that is unchanged up to rounding keeps its digits. A rotation has several triples of
+    roll, pitch and yaw angles; the triple nearest to the old angles is written.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -98,7 +99,13 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class UpdatedURDF:
-    """A robot with new joint origins (4, 4), by joint name, and Pinocchio's check of the new text."""
+    """A URDF with new joint origins.
+
+    Attributes:
+        robot: The robot before the change.
+        origins: The new origin (4, 4) of each changed joint, by joint name.
+        certificate: The result of checking the new URDF with Pinocchio; None if it was not checked.
+    """
 
     robot: Robot
     origins: Mapping[str, FloatArray]

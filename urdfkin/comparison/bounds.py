@@ -7,8 +7,8 @@ coordinate at a time. The largest distance found by the search is a lower bound.
 between the models. Each term is the largest effect of one difference over all configurations. If the models
 differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. The
 function divides the space of all variables into boxes. Let D(q) = p_B - p_A be the difference of the frame's
-positions in B and A. Let c be the middle of a box. Let h_i be half the box's width along variable i, and x_i
-the change of variable i from c. Then
+positions in B and A. Let c be the middle of a box. In this box, variable i ranges from c_i - h_i to c_i +
+h_i. At a configuration q in the box, variable i has the value c_i + x_i. Then
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
@@ -61,9 +61,9 @@ PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 class DistanceSearch:
     """Search for the configurations at which two aligned robots differ most.
 
-    The search for matching joints starts at the base link of A and at the base link of B. The pose of B's
-    base link in the frame of A's base link is constant. With `as_written`, the pose of B's root in A's root
-    frame is constant instead.
+    The search for matching joints starts at the base link of A and at the base link of B. If `as_written` is
+    False, the pose of B's base link in the frame of A's base link is constant. If `as_written` is True, the
+    pose of B's root in A's root frame is constant.
     """
 
     def __init__(
@@ -81,8 +81,7 @@ class DistanceSearch:
         self.rng = np.random.default_rng(seed)
         #: Pose (4, 4) of B's base link in A's root frame, while A is in its zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: Two booleans, for A and for B.
-        #: True: the robot's base link belongs to the same rigid body as its root link.
+        #: For A and for B: whether the base link and the root link belong to the same rigid body.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
@@ -181,7 +180,10 @@ class DistanceSearch:
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames), m, at sampled values, and the values (n, variables)."""
+        """Sample n values (n, variables) of the variables, and compute the distances (n, frames), m.
+
+        Return the distances and the sampled values.
+        """
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
         corners = np.where(self.rng.random((CORNER_SAMPLES, len(self.names))) < 0.5, low, high)
@@ -335,7 +337,10 @@ class BoxBounds:
     def _origin(
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) of the point `tool` of a frame, and its Jacobian (n, 3, nv)."""
+        """Return the position (n, 3) of a point, and the Jacobian (n, 3, nv) of this position.
+
+        The point is fixed in the frame `frame`, and has the coordinates `tool` (3,), m, in this frame.
+        """
         inputs = _flat_inputs(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not tool.any():
@@ -349,8 +354,8 @@ def tighten(
 ) -> float:
     """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
-    `upper` must be a proven bound. The function returns the smallest bound that it proves. If it proves no
-    smaller bound, the function returns `upper`. The function ends when the bound `target` (m) is proven.
+    `upper` (m) must be a proven bound. The result is `upper` or a smaller proven bound. The function ends
+    when the bound `target` (m) is proven, or when more boxes than `most` would be needed.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
@@ -393,7 +398,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return the number of halvings after which the second-order term of a box's bound is below `upper`."""
+    """Return how often a box must be halved until the term (1/2) sum_ij M_ij h_i h_j is below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

@@ -37,7 +37,8 @@ MAX_RECHECK_BOXES = 2**22
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: The relative tolerance of a bound is this number times the machine epsilon.
 _BOUND_TOLERANCE = 64.0
-#: Entries that `recheck` computes again from the two models, and compares with the certificate.
+#: Entries of a certificate that follow from the two models.
+#: `recheck` computes these entries again, and compares the results with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -166,7 +167,7 @@ class Confirmed(TypedDict):
 
 
 class SameCertificate(Header):
-    """Certificate of whether two models describe the same robot, with the data of the proof in m and rad."""
+    """Certificate of a comparison of two robot models: the verdict, and the proof's data in m and rad."""
 
     a: CertifiedModel
     b: CertifiedModel
@@ -467,9 +468,10 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Check an interval; `rounding` is (m, rad).
+    """Yield an error message for each wrong bound of an interval in a certificate.
 
-    If `sharply` is true, the check may use branch and bound, a slow method.
+    `rounding` contains the distance (m) and the angle (rad) between matching frames that rounding errors can
+    cause. If `sharply` is true, the check may use branch and bound, a slow method.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

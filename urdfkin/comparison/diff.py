@@ -1,4 +1,4 @@
-"""List the changes between two versions of a robot description, and bound how far they move the frames.
+"""List the changes between two versions of a robot description, and bound the displacements of frames.
 
 Two files of the same format are compared attribute by attribute. Files of different formats have different
 attributes; `diff` then lists the differences that `same` finds.
@@ -42,7 +42,8 @@ _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Changes that move a link, for two versions of different formats.
+#: Values of `ModelChange.what` for changes that move a link.
+#: `diff` uses these values if the two versions have different formats.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -93,7 +94,12 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The frame with the largest displacement if only one joint is changed, and this displacement."""
+    """Effect of the changes of one joint, while all other joints are unchanged.
+
+    Attributes:
+        element: The changed element, for example "joint elbow".
+        interval: The frame with the largest displacement, and bounds on this displacement.
+    """
 
     element: str
     interval: Interval
@@ -113,8 +119,8 @@ class Changes:
     Attributes:
         sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
-        effects: Effects of the changes that move links, one for each changed joint. Each effect is computed
-            with only this joint changed.
+        effects: One effect for each joint whose changes move links. To compute the effect of a joint, urdfkin
+            changes this joint in the old version, and leaves all other joints unchanged.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
         rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
             `changes` does not list this error. None if single precision does not explain all differences
@@ -319,7 +325,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect if only the joint `name` is changed.
+    """Replace the joint `name` of the old tree by the joint of the new tree, and return the effect.
 
     Return None if no frame moves, or if the effect cannot be computed.
     """

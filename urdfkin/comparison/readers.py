@@ -56,13 +56,14 @@ class ReaderDifference:
 
 @dataclass(frozen=True, slots=True)
 class LibraryReading:
-    """The differences between a library and urdfkin in reading a robot file.
+    """How another library reads a robot file, and how the result differs from urdfkin's result.
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
         missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
             the USD file) are listed.
-        worst: Largest difference of link poses relative to the first common link; 0 if only rounding differs.
+        worst: Largest difference between two matching entries of link poses. The poses are relative to the
+            first common link. The value is 0 if the difference is at most the tolerance.
     """
 
     library: str
@@ -96,9 +97,9 @@ def compare_readers(
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or no installed library reads the file's format. The error is
-            also raised for a robot with a locked joint, and for a robot from MJCF text instead of a file. A
-            robot from a USD file with a selected variant or articulation raises the error too.
+        InputError: a library is not installed, or no installed library reads the file's format. A robot with
+            a locked joint causes the error. A robot from MJCF text instead of a file causes the error. A
+            robot from a USD file with a selected variant or articulation causes the error.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
@@ -201,7 +202,7 @@ def _library_input(robot: Robot) -> tuple[str, str]:
 
 
 def _remove_shapes(text: str) -> str:
-    """Return a URDF without shapes; some libraries search the disk for mesh files."""
+    """Return a URDF without shapes, because some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
     robot = parse_xml(text)

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
 #: A length or angle of at least 0.9 m or 0.9 rad is written without a unit prefix.
-#: A smaller value has the first unit prefix for which the written number is at least 0.1.
+#: A smaller value is written in the largest prefixed unit that makes the number at least 0.1.
+#: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
 #: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
@@ -56,7 +57,7 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes of B after which `same` still calls the models equivalent.
+#: Kinds of changes of B. The models are equivalent if changes of these kinds make B equal to A.
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between matching frames has an upper bound.
@@ -65,12 +66,11 @@ BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """The question whether two models are equivalent, or whether their frames are close enough.
+    """A condition for the result of a comparison; `Sameness.holds` checks the condition.
 
     `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
-    models. With None, the question is whether the models are equivalent. If `strict` is true, the answer is
-    no for models with remarks. With `strict`, the answer is also no if only changes of B make the models
-    equivalent.
+    models. If `within` is None, the verdict must not be `Verdict.DIFFERS`. If `strict` is true, there must be
+    no remarks, and the verdict must not be `Verdict.SAME_AFTER`.
     """
 
     within: float | None = None
@@ -107,7 +107,9 @@ class Interval:
 
 #: Value of a parameter of a joint or link.
 #: A str is a type or a name, and a float is a limit of velocity or effort.
-#: A tuple contains the two limits of a range, several names, or the type and the value of an idle joint.
+#: For "limits", a tuple contains the lower and the upper limit.
+#: For "idle", a tuple contains the type of a joint that never moves, and the joint's value (rad or m).
+#: For "only in A" and "only in B", a tuple contains the names of links.
 #: A `Mimic` is a mimic rule; None means that the parameter has no value.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
@@ -146,7 +148,7 @@ class Difference:
         return a, b
 
     @property
-    def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own return
+    def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own text
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         match what:
@@ -225,9 +227,9 @@ class JointDifference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base".
             The text is empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A. None if `b` is not a value of the parameter.
-        b: The parameter's value in B. If `a` is None, `b` describes the difference in words. If the models
-            cannot be compared at this joint or link, `b` is the reason.
+        a: The parameter's value in A; None if `b` is a description in words.
+        b: The parameter's value in B, or a description in words. The description states the difference, or
+            the reason why the models cannot be compared at this joint or link.
         explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
@@ -264,7 +266,7 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Pinocchio's confirmation of the bounds, or the reason why there is none.
+    """Result of Pinocchio's check of the bounds, or the reason why the bounds were not checked.
 
     `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
     configurations.
@@ -334,17 +336,16 @@ class Sameness(Displayable):
         unexplained: Differences between the unchanged models, each at one joint or link. Rounding does not
             explain these differences. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links. The interval contains the largest distance
-            between the two links, after B is changed as in `after`.
+            between the two links. The changes in `after` are applied to B before the distance is computed.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
         bound_as_written: (m, rad) proven bounds on the distance and on the angle between matching frames of
             the unchanged models. The bounds hold for all pairs of matching frames. The bounds are infinite if
             no bounds were proven. If one model is a Denavit-Hartenberg table, only frames with the same name
-            in A and B count.
-        narrowed: One line of text for each mimicked joint whose range contains values at which a mimic joint
-            exceeds its limits. The distances in `frames` are computed for the whole range of the mimicked
-            joint.
-        confirmation: Pinocchio's confirmation, or the reason why there is none.
+            in A and B are compared.
+        narrowed: One line of text for each mimicked joint with a larger range than the limits of its mimic
+            joints allow. The distances in `frames` are computed for the whole range of the mimicked joint.
+        confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
     >>> import urdfkin
@@ -427,7 +428,9 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether the models differ, but each joint only by the rounding of its numbers to single precision.
+        """Whether rounding to single precision explains every difference in motion between the models.
+
+        Each joint is checked separately. If the models are the same, the result is False.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single
@@ -474,7 +477,7 @@ class Sameness(Displayable):
         ) <= most
 
     def holds(self, question: SameQuestion) -> bool:
-        """Return whether the answer to a question is yes.
+        """Return whether the result meets the condition `question`.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -490,7 +493,7 @@ class Sameness(Displayable):
 
         Args:
             strict: If true, the exit code is 1 for models with remarks, such as different joint limits. With
-                `strict`, the exit code is also 1 if only changes of B make the models equivalent.
+                `strict`, the verdict `Verdict.SAME_AFTER` also causes the exit code 1.
             within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
                 are written.
 
@@ -702,7 +705,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
-                continue  # The listed change of the base pose causes this displacement.
+                continue  # The line about the base pose already describes this difference.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -856,7 +859,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m); rounding errors become 0."""
+    """Return the tilt (rad) and the shift (m); a value that rounding errors can explain is replaced by 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 
@@ -870,7 +873,8 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return the differences that do not affect motion.
 
-    `single` is the relative error of a number in single precision, or 0 if both models have double precision.
+    `single` is the relative rounding error of a number in single precision. If the numbers of both models
+    have double precision, `single` is 0.
     """
     some = list[Difference]()
     for step in alignment.steps:
@@ -915,9 +919,9 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is a relative tolerance for limits. If both limits have absolute values below 1 (rad or m),
-    `tolerance` is an absolute tolerance. `single` is the relative error of a limit in single precision, or
-    0 if both models have double precision. With `zero` = (sign, offset), the joint's value in B is sign *
-    (value in A) + offset.
+    `tolerance` is an absolute tolerance. `single` is the relative rounding error of a limit in single
+    precision. If the limits of both models have double precision, `single` is 0. With `zero` = (sign,
+    offset), the joint's value in B is sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

@@ -62,7 +62,7 @@ from urdfkin.verify.verifier import as_verify
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: For the unchanged models, the search for the largest distance also uses at most this number of frames.
+#: The search for the largest distance between the unchanged models uses at most this number of frames.
 MAX_FARTHEST_FRAMES = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 MAX_PATH_LENGTH = 1e150
@@ -122,8 +122,7 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # The comparison caches compiled trees in its robots.
-    # Therefore, `same` uses copies of the user's robots.
+    # The comparison stores compiled trees in the robots, so `same` passes copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -327,7 +326,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the distance and the angle (m, rad) between frames that differ only by rounding.
+        """Bound the distance (m) and the angle (rad) between matching frames that rounding can cause.
 
         `same` ignores a small rounding difference at each joint. These differences add up along the path. If
         an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
@@ -478,7 +477,7 @@ class Comparator:
         )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Compute each frame's largest distance (m) in random configurations with Pinocchio."""
+        """Return each frame's largest distance (m) that Pinocchio computes at random configurations."""
         search = self.search(alignment, variables)
         q_a, q_b = search.configurations(search.random_values(CONFIRMATION_SAMPLES), random_free_joints=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
@@ -511,7 +510,10 @@ def _joints_fixed_in_one(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return indices of the fixed joints whose name or child link belongs to a moving joint of `other`."""
+    """Return the indices of the fixed joints of `tree` that are moving joints in `other`.
+
+    Two joints match if the joints have equal names, or if the child links of the joints have equal names.
+    """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
     children = {
@@ -584,8 +586,9 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame for unchanged models.
 
-    The two roots coincide, with one exception. The root body of one model may contain a link that has the
-    name of the other model's root. This link then coincides with the root of the other model.
+    If a link on B's root body has the name of A's root, this link coincides with A's root. If a link on A's
+    root body has the name of B's root, this link coincides with B's root. Without such a link, the two roots
+    coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -613,7 +616,7 @@ class JointComparison:
     of the numbers that define this joint.
 
     **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
-    may shift the origin of a joint along the joint's axis, and a converter may add or merge fixed links. The
+    may shift the origin of a joint along the joint's axis. A converter may add or merge fixed links. The
     proof therefore compares quantities that do not depend on the choice of frames. For a link in A, let P be
     the nearest ancestor that B also has. For each link that both models have, the proof compares three
     quantities in the zero configuration, in the frame of P:
@@ -647,13 +650,13 @@ class JointComparison:
     rotation error of this frame. The multiplier and the offset of a mimic rule have a relative error of at
     most 2^-24.
 
-    In B, the compared link can be on another branch than P. Then the two branches begin at a common ancestor
-    of P and the link. Let W and E be the position error and the rotation error of the link relative to this
-    common ancestor. Let V and F be the position error and the rotation error of P relative to the common
-    ancestor. Let d be the distance between the link and P. Then the position error of the link relative to P
-    is at most W + V + F d. The rotation error of the link relative to P is at most E + F. `same` ignores the
-    rounding errors of double precision, so these errors are added to the bounds. If both models are rounded,
-    the bounds of both models are added.
+    In B, P may not be an ancestor of the link. P and the link are then on two branches, which begin at a
+    common ancestor of P and the link. Let W and E be the position error and the rotation error of the link
+    relative to this common ancestor. Let V and F be the position error and the rotation error of P relative
+    to the common ancestor. Let d be the distance between the link and P. Then the position error of the link
+    relative to P is at most W + V + F d. The rotation error of the link relative to P is at most E + F.
+    `same` ignores the rounding errors of double precision, so these errors are added to the bounds. If both
+    models are rounded, the bounds of both models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
     joint's parent may be a link that only B has. B may also have additional joints between P and the joint.
@@ -665,9 +668,10 @@ class JointComparison:
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
     smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
-    detect this error. The proof does not cover planar joints, floating joints, joints in another order, and
-    links on different branches of A and B. These joints and links must agree up to double precision. If one
-    of these joints or links has a larger difference, `same` reports the difference as not explained.
+    detect this error. The proof has three conditions. In A and in B, the same moving joints lead from P to
+    the link, in the same order. A planar or floating joint is attached to the root body, and is the only
+    joint between P and the link. The frames of this planar or floating joint agree in A and B up to double
+    precision. If a condition does not hold, `same` reports the difference as not explained.
 
     `errors` contains an array (joints, 3) of error bounds for A, and an array for B. The columns are the
     position error (m), the rotation error (rad), and the relative error of the mimic rule. The bounds are 0
@@ -711,9 +715,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P and the joints from P to the link.
+        """Return the link's nearest ancestor P that both models have, and the joints from P to the link.
 
-        P is the link's nearest ancestor that both models have.
+        If the models have no common ancestor of the link, P is the link at which the compared paths begin.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -724,7 +728,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return two lists: the joints from the last common ancestor to `start`, and the joints to `end`."""
+        """Return the joints that lead from the last common ancestor of two links to each of the links."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -743,7 +747,8 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # The list `paths[1][0]` contains the joints of B from the last common ancestor to P.
+        # P and the link have a last common ancestor in B.
+        # The list `paths[1][0]` contains the joints from this ancestor to P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -778,8 +783,8 @@ class JointComparison:
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle (rad) and the distance (m) between two joint axes.
 
-        The distance is that of a point on one axis from the other axis. For a prismatic joint, the distance
-        is 0, because the axis has only a direction.
+        The distance is the shortest distance from the joint's origin on one axis to the other axis. For a
+        prismatic joint, the distance is 0, because the axis has only a direction.
         """
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -789,8 +794,8 @@ class JointComparison:
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
         """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
 
-        Both lists of joints begin at the last common ancestor. The joints in `back` lead to P. The joints in
-        `path` lead to the link.
+        P and the link have a last common ancestor. The list `back` contains the joints from this ancestor to
+        P. The list `path` contains the joints from this ancestor to the link.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)
@@ -811,7 +816,10 @@ class JointComparison:
         return screws, T_P_common @ T, errors_in_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
-        """Return the error bounds (m, rad) after a joint; `errors` are the bounds before the joint."""
+        """Return the error bounds (m, rad) of the frame after a joint.
+
+        `errors` contains the error bounds (m, rad) of the frame before the joint.
+        """
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
         return np.array([errors[0] + errors[1] * lever + metres, errors[1] + radians])
