@@ -30,7 +30,8 @@ class Table:
     """A table of text and numbers; numbers are displayed with six digits.
 
     Attributes:
-        left: Number of left-aligned columns, or their indices; cells in these columns keep leading blanks.
+        left: The left-aligned columns: the number of columns from the left, or a collection of column
+            indices. The cells of left-aligned columns keep leading blanks.
         names: Indices of columns that Markdown displays as code.
     """
 
@@ -50,7 +51,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each heading and cell into two texts: leading characters such as `├─`, and the rest."""
+        """Split each heading and cell into two texts: leading characters such as `├ `, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(TREE_LINES),)]
             for row in (self.heads, *self.cells())

@@ -84,7 +84,10 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 
 
 def json_text(data: Any) -> str:
-    r"""Return JSON in ASCII without commands to a CI service; a parser restores the original names.
+    r"""Return data as JSON text in ASCII.
+
+    A CI service can interpret text such as `##[error]` as a command. Therefore, the second `#` of each `##`
+    is escaped. A JSON parser restores the original text.
 
     >>> print(json_text(["\u202e ##[error]"]))
     ["\u202e #\u0023[error]"]

@@ -17,7 +17,8 @@ _INTEGER = re.compile(r"[+-]?[0-9]+")
 #: Maximum number of characters of a number, because Python converts long integers in quadratic time.
 _MAX_LENGTH = 2000
 
-#: Pairs of a pattern and a remedy; the first pattern that matches a text determines the remedy.
+#: Patterns of invalid numbers, each with the remedy for the message.
+#: If several patterns match, the first pattern determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),

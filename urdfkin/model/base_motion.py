@@ -14,10 +14,11 @@ from urdfkin.model.tree import FloatArray, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMotion:
-    """Motion of the robot's root link relative to the world; the textbook numbers the world frame -1.
+    """Motion of the robot's root link relative to the world.
 
-    Every field may have leading batch axes, which broadcast with the batch axes of the configuration. The
-    fields store exactly the given numbers, because a comparison with Pinocchio starts from the same numbers.
+    In the textbook, the world frame has the number -1. Every field may have leading batch axes, which
+    broadcast with the batch axes of the configuration. The fields store the given numbers unchanged, because
+    a verification computes Pinocchio's input from these numbers.
 
     Attributes:
         placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals; the

@@ -34,7 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Smallest size (m) that a comparison assumes for a robot, even if all its frames coincide.
+#: A comparison assumes that a robot has at least this size (m).
+#: Otherwise, the size of a robot would be 0 if all frames of the robot coincide.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -45,8 +46,9 @@ class ChainJoint:
     Attributes:
         backwards: Whether the path passes the joint from the joint's child link to its parent link.
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
-            frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
-            frame after that joint's motion; for the first joint, relative to the base.
+            frame is the joint's axis. If `backwards` is true, the z axis has the opposite direction. The pose
+            is relative to the previous joint's frame after the previous joint's motion. The pose of the first
+            joint is relative to the base.
         limit: None if the joint has no limits.
         mimic: None if the joint has its own coordinate.
     """
@@ -263,7 +265,7 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
 
 
 def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """Return all joints from `base` to `tip`; True marks a joint that is passed from child to parent."""
+    """Return each joint from `base` to `tip`, with True if the path passes the joint from child to parent."""
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
     while common < min(len(up), len(down)) and up[common] == down[common]:

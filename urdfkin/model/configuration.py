@@ -46,24 +46,24 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest absolute value (rad or m) of a sampled joint value.
-#: This number replaces a missing limit, but the range of a continuous joint is -pi to pi.
-#: Bounds that require limited travel assume this distance (m) from zero for joints without limits.
-#: These joints are planar, floating and unlimited prismatic joints.
+#: Largest absolute value (rad or m) of a random joint value.
+#: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
+#: Some upper bounds hold only if the joints without limits travel at most this distance (m) from zero.
+#: Such joints are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
 #: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: Text of the condition under which such a bound holds.
+#: Text of the condition under which such an upper bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
 @dataclass(frozen=True, slots=True)
 class RangeReduction:
-    """A mimicked joint's own range, and the part of this range that its mimic joints allow.
+    """The range of a mimicked joint, and the smaller range that the limits of the mimic joints allow.
 
     Attributes:
-        allowed_range: The part of `joint_range` in which all mimic joints are within their limits; None if at
-            most one value is allowed.
+        allowed_range: The part of `joint_range` in which all mimic joints are within their limits. None if
+            this part contains at most one value.
         mimic_joints: Names of the mimic joints whose limits make the range smaller.
     """
 
@@ -157,9 +157,10 @@ def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
 
 
 def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """Return the part of a mimicked joint's range that the limits of a mimic joint allow.
+    """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
 
-    If the limits allow no value of the range, the returned lower end is above the returned upper end.
+    `lower` and `upper` are the ends of the mimicked joint's range. If the limits of the mimic joint allow no
+    value of this range, the returned lower end is above the returned upper end.
     """
     least, most = _widen_limits(limit)
 
@@ -194,11 +195,11 @@ _MIMIC_TOLERANCE = 1e-9
 
 
 #: Suffix and unit of each coordinate of a planar or floating joint.
-#: `_VELOCITY_SUFFIXES` contains the suffixes and units of the joint velocities of these joints.
 _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
+#: Suffix and unit of each joint velocity of a planar or floating joint; the time unit s is omitted.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
@@ -315,8 +316,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    The tree's pose `ready` may contain values for some joints only. The remaining joints are at 0 in `ready`.
-    If a joint's range excludes 0, the joint is in the middle of the range instead.
+    The tree's pose `ready` may contain values for some joints only. In `ready`, the value of each remaining
+    joint is 0. If the joint's range does not contain 0, the value is the middle of the range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -381,7 +382,8 @@ def parse_locks(
 def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
     """Raise InputError if the value of a locked joint or of its mimic joint is outside the limits.
 
-    The limits of mimic joints are not checked if these limits allow at most one value of the locked joint.
+    The limits of the mimic joints can together allow at most one value of the locked joint. In this case, the
+    limits of these mimic joints are not checked.
     """
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
@@ -504,13 +506,13 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Maximum number of configurations that urdfkin checks for degrees.
-#: All configurations of a batch have the same unit, so urdfkin checks only some of them.
+#: To find angles in degrees, urdfkin checks at most this number of configurations of a batch.
+#: A few configurations are enough, because all configurations of a batch have the same unit.
 _MAX_CHECKED = 16
 
 
 def degrees_messages(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return `limit_violations` of values that look like degrees; check at most 16 configurations."""
+    """Return a message for each joint whose value seems to be in degrees; check at most 16 configurations."""
     if tree.min_implausible_angle == math.inf or not q.size:
         return []
     if q.ndim == 2:
@@ -625,7 +627,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Largest sampled coordinate (m) of the position of a planar or floating joint.
+#: Random x, y and z coordinates of a planar or floating joint are between -2 and 2 m.
 _MAX_POSITION = 2.0
 
 

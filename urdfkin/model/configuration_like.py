@@ -50,8 +50,8 @@ class CoordinateLayout:
         symbol: "q", "v" or "a".
         units: "rad", "m", "" or None. A number without a unit, such as a component of a quaternion, has "".
             None means that the unit is unknown.
-        spans: Pair (index of the joint's first number, count of the joint's numbers), for each joint with
-            several numbers.
+        spans: For each joint with several numbers, by the joint's name: the index of the first number, and
+            the count of the numbers.
         hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
         hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of
             Pinocchio's q.
@@ -88,10 +88,10 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the named pose (n,) or None.
+        """Parse a text or mapping; return the given values by name, and the pose (n,) that the text names.
 
-        A text such as `ready, elbow=pi/2` begins with the name of the pose. Without such a name, the second
-        result is None.
+        For example, the text `ready, elbow=pi/2` names the pose `ready`. If the input names no pose, the
+        second result is None.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)

@@ -50,8 +50,8 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    For a continuous joint, the result is the shorter of the two possible rotations. The angle of a planar
-    joint also changes by the shorter rotation.
+    A continuous joint can rotate to `end` in two directions. The result contains the shorter of the two
+    rotations. The same rule holds for the angle of a planar joint.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))

@@ -59,7 +59,10 @@ class JointTable(dict[str, Joint], Displayable):
 
 
 def tree_guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield the box-drawing characters before each link name, such as `├─`; an only child has none."""
+    """Yield the box-drawing characters before each link name, for example `├ `.
+
+    A link without siblings is indented as far as its parent link.
+    """
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1

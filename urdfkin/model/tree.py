@@ -2,8 +2,8 @@
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
 first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
-has the name of its link or joint. If a link and a joint at different places have the same name, the prefix
-`link:` or `joint:` is needed.
+has the name of its link or joint. A link and a joint can have the same name. If the link is not the joint's
+child link, the prefix `link:` or `joint:` is needed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ FloatArray = inputs.FloatArray
 class FrameName(str):
     """The name of a frame with a prefix, `link:NAME` or `joint:NAME`.
 
-    A `FrameName` means the link or joint NAME, even if another link or joint has the name `link:NAME`.
+    `LinkFrame("link:NAME")` always selects the link NAME. A plain string "link:NAME" can also be the full
+    name of a link or joint.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
@@ -105,10 +106,10 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value is far outside the limits if the value exceeds a limit by more than `_FAR_DISTANCE`.
-#: The unit of `_FAR_DISTANCE` is rad or m.
-#: The value must also exceed this limit by more than `_FAR_FRACTION` times the joint's range.
-#: If a limit is missing, each value that exceeds the other limit is far outside.
+#: A joint value is far outside the limits if both of the following conditions hold.
+#: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
+#: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
+#: If a joint has only one limit, each value that exceeds this limit is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
@@ -151,8 +152,9 @@ class Joint:
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
             child link's frame is the joint frame after the motion.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
-            urdfkin uses this angle, but the angle may increase the differences between urdfkin and Pinocchio.
+        tilt: Angle (rad) between `axis` and the coordinate axis that Pinocchio uses for the joint; usually 0.
+            If the angle is not 0, urdfkin reports the finding URDF514. urdfkin's kinematics do not depend on
+            the angle. The angle can increase the differences between the results of urdfkin and Pinocchio.
         lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
     """
 
@@ -376,7 +378,8 @@ class KinematicTree:
 
         A link or joint with exactly this name has priority. If no link or joint has this name, `link:NAME`
         selects the link NAME, and `joint:NAME` selects the joint NAME. An unknown name raises
-        UnknownNameError. A name that a link and a joint at different places share raises InputError.
+        UnknownNameError. If a link and a joint have this name, the link must be the joint's child link;
+        otherwise, InputError is raised.
         """
         if not isinstance(name, str):
             raise InputError(

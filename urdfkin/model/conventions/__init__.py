@@ -1,4 +1,8 @@
-"""Conventions of other programs: orders of joints and rows, quaternions, base velocities, units and zeros."""
+"""Convert q, v, a and Jacobians between urdfkin's convention and the conventions of other programs.
+
+A convention defines, for example, the order of the joints, the axes of the base's velocity, and the unit of
+angles.
+"""
 
 from urdfkin.model.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
 from urdfkin.model.conventions.conversion import Conversion, Reordering, find_reordering

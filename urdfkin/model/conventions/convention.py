@@ -64,8 +64,9 @@ class JointRule:
     The property `factor` includes the sign.
 
     Attributes:
-        unit: "rad", "deg", "turn", "m" or "mm". Another unit of an angle is given as a number: the count of
-            units in one turn. None means the convention's unit; in this case, `factor` is None.
+        unit: Unit of the other program's value: "rad", "deg", "turn", "m" or "mm". A number defines another
+            unit of angles: the number of units in one full turn, for example 4096 for an encoder. None
+            selects the convention's unit; `factor` is then None.
     """
 
     name: str | None = None
@@ -310,8 +311,9 @@ def transcode(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     The result begins with "tn__" and the name's letters, digits and underscores (ASCII). The character "_"
-    follows if the name contains such characters. The result ends with a number in base 62 for each remaining
-    character. The numbers are in the order of the code points. An identifier is returned unchanged.
+    follows if the name contains such characters. Each of the other characters becomes a number in base 62.
+    These numbers are at the end of the result, in the order of the code points. An identifier is returned
+    unchanged.
 
     As in Punycode, the number is d n + p. The difference d is the character's code point minus the code point
     of the previous character. p is the character's position among the characters that are already encoded. n

@@ -34,8 +34,9 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """One number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
 
-    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `is_mimic` is true for a
-    number of a mimic joint. The q and v of urdfkin contain no number for a mimic joint.
+    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `is_mimic` is true if the
+    number is the value or velocity of a mimic joint. The q and v of urdfkin contain no number for a mimic
+    joint.
     """
 
     name: str
@@ -49,11 +50,12 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint; the target program uses other axes or another point for its velocity.
+    """A planar or floating joint whose velocity is defined differently in the target program.
 
-    `q` is the index of the joint's first coordinate in urdfkin's q. `v` is the index of the joint's first
-    velocity in urdfkin's v. `rows` are the joint's indices in the target program's v. The target program uses
-    the linear velocity of the point `point` (3,), whose coordinates are in the joint's frame.
+    The target program uses other axes than urdfkin for the velocity, or the linear velocity of another point.
+    This point is `point` (3,), with coordinates in the joint's frame. `q` is the index of the joint's first
+    coordinate in urdfkin's q. `v` is the index of the joint's first velocity in urdfkin's v. `rows` are the
+    joint's indices in the target program's v.
     """
 
     joint: Joint
@@ -147,7 +149,7 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _determines_coordinate(self, i: int) -> bool:
-        """Return whether the value of joint i determines a coordinate.
+        """Return whether urdfkin can compute a coordinate from the value of joint i.
 
         A mimic joint with the multiplier 0 does not determine the mimicked joint's coordinate.
         """
@@ -338,7 +340,10 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers."""
+        """Index array with which `q[..., permutation]` is the target program's q.
+
+        None if the conversion also changes values, for example radians to degrees.
+        """
         return self._q_index.copy() if self._plain_q else None
 
     @property
@@ -355,9 +360,9 @@ class Conversion:
 
     @property
     def velocity_permutation(self) -> NDArray[np.intp] | None:
-        """Index array with which `v[..., velocity_permutation]` is the tool's v.
+        """Index array with which `v[..., velocity_permutation]` is the target program's v.
 
-        None if the conversion does more than reorder the numbers.
+        None if the conversion also changes values, for example radians to degrees.
         """
         return self._v_index.copy() if self._plain_v else None
 
@@ -386,8 +391,9 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
-        The conversion of v may depend on q, and the conversion of a on q and v. If the target program has the
-        same q, the same array is returned. A wrong length or a number that is not finite raises InputError.
+        The conversion of v may depend on q. The conversion of a may depend on q and v. If q is equal in both
+        conventions, the result can be the array q itself. A wrong length or a number that is not finite
+        raises InputError.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -565,8 +571,9 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
-        Several numbers of v_tool may depend on the same number of v. In this case, M^-1 computes the number
-        of v from one of these numbers. For each unused number of v_tool, the column of M^-1 is 0.
+        Several numbers of v_tool may depend on one number of v. For example, v_tool may contain the
+        velocities of a joint and of its mimic joints. M^-1 uses only one of these numbers. The columns of
+        M^-1 for the other numbers are 0.
         """
         if not self._blocks:
             M_inverse = np.zeros((self.tree.nv, self.nv))
@@ -578,7 +585,10 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return a joint's block (..., k, k) of `matrix`; with v, return the time derivative of the block."""
+        """Return the block (..., k, k) of `matrix` that belongs to a planar or floating joint.
+
+        If the joint's velocity v is given, the result is the time derivative of the block.
+        """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
@@ -625,10 +635,11 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(J, -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
+        """Convert the columns of a matrix J (..., rows, nv) to the columns of the target program: J M^-1.
 
-        The rows must have the same meaning in both conventions, such as derivatives of Euler angles.
-        InputError is raised if several columns of the target program belong to one column of J.
+        The rows do not change, so each row must have the same meaning in both conventions. An example is the
+        derivative of an Euler angle. If the target program has additional columns for mimic joints,
+        InputError is raised.
         """
         self._check_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -637,9 +648,10 @@ class Conversion:
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
+        """Convert a Jacobian J (..., 6, program's nv) of the target program to urdfkin's convention: S J M.
 
-        The column of a mimic joint is added to the mimicked joint's column.
+        The result has the shape (..., 6, nv). The column of a mimic joint is added to the mimicked joint's
+        column.
         """
         array = self.reorder_six_vector(J, -2)
         return array @ _add_frame_axis(self.matrix(q), array.ndim)
@@ -657,7 +669,10 @@ class Conversion:
         return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert a Jacobian's derivatives H (..., 6, nv, nv) with respect to the joint coordinates."""
+        """Convert a kinematic Hessian H (..., 6, nv, nv) to the target program's rows and columns.
+
+        H contains the derivatives of the Jacobian J (..., 6, nv) with respect to the joint coordinates.
+        """
         self._check_columns()
         inverse, tensor, columns = (
             self.inverse_matrix(q),
@@ -781,10 +796,10 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each entry of urdfkin's q or v, return the index of the number that determines the entry.
+    """For each number of urdfkin's q or v, return the index of a number of the target program.
 
-    The index refers to the target program's q or v. A number of an independent joint has priority over a
-    number of a mimic joint.
+    The target program's number determines urdfkin's number. The numbers of independent joints have priority
+    over the numbers of mimic joints.
     """
     return [
         min(

@@ -1,15 +1,18 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-Joints at two matched bodies are paired by the names that the user gives or by equal names. The remaining
-joints are paired by equal labels of the links after the joints, or by geometry.
+The joints at two matched bodies are paired in three steps. First, joints are paired by the names that the
+user gives, or by equal names. Second, two joints are paired if the bodies after the joints contain links with
+equal labels. By default, a link's label is the link's name. Third, the remaining joints of the same kind are
+paired by geometry, the most similar joints first.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. Links with equal labels must coincide too. By default, a link's label is the link's name.
-The multipliers of the mimic rules must correspond. The method `SubtreeMatcher.ignore_rules` removes this last
-condition. The value of the joint before a subtree does not matter, because the joint's zero offset can
-compensate any value. Therefore, the result depends only on the two joints before the subtrees, and on the
-pose of one joint's axis relative to the other. `SubtreeMatcher` stores the result of each such case, so that
-the search is fast even for long chains.
+the other subtree. With the same zero offsets, links with equal labels must coincide. The multipliers of the
+mimic rules must also correspond; the method `SubtreeMatcher.ignore_rules` removes this condition.
+
+The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
+value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
+and the pose of B's joint axis relative to A's joint axis. `SubtreeMatcher` stores the result of each
+comparison, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -129,7 +132,8 @@ class JointMatcher:
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
         """Return whether each joint axis of a body of A coincides with a joint axis of a body of B.
 
-        `bodies` are the two bodies. The pose X first moves the body of B.
+        `bodies` contains the indices of the two bodies. The rigid motion X (4, 4) moves B's axes before the
+        comparison.
         """
         return all(
             any(
@@ -298,8 +302,8 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield each pair of a joint axis at A's body and a joint axis of the same kind at B's body.
 
-    After a pair, the function continues with the two next bodies if A's axis is parallel to A's `reference`
-    line.
+    If A's axis is parallel to A's `reference` line, the function also yields the pairs at the next two
+    bodies.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -395,7 +399,7 @@ def _first_axes(
     """Return the first pair of revolute axes for each pair of a branch of A and a branch of B.
 
     Each item contains the first revolute pair, the prismatic pairs before this pair, and the pairs after this
-    pair. If two branches have only prismatic pairs, the last prismatic pair takes the place of the first
+    pair. If two branches have only prismatic pairs, the item contains the last prismatic pair instead of a
     revolute pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
@@ -436,7 +440,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 #: The third argument is the pose of B's body before the joints.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joint pairs that the search for an exact match tries at two bodies.
+#: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
 MOST_ASSIGNMENTS = 5000
 
 #: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.

@@ -58,9 +58,10 @@ MOST_DEPTH = 200
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: Of two scores, the score with more agreeing links and axes is better.
-#: If both numbers are equal, the largest differences (m) of the two scores are compared.
-#: A score is then better if its difference is less than this factor times the difference of the other score.
+#: The score of an alignment is the number of links and axes that agree, and the largest difference (m).
+#: The alignment with the larger number is better.
+#: If the numbers are equal, an alignment with a much smaller difference is better.
+#: The smaller difference must be less than this factor times the larger difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -71,9 +72,10 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """Number of joint pairs beyond the current joint that the matcher may still compare.
+    """A limit on the number of later joint pairs that the matcher compares.
 
-    Several matchers can share this number.
+    The matcher compares later joints if several choices at a joint are equally good. `remaining` is the
+    number of joint pairs that the matcher may still compare. Several matchers can share one limit.
     """
 
     remaining: int
@@ -98,9 +100,10 @@ class BodyPair:
 class MechanismMatcher:
     """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
 
-    Without `choices`, the matcher finds the choices for which most joints and links agree. Without `base`,
-    the matcher starts at A's root body. In B, the matcher starts at the body that shares most link names with
-    A's root body. If no body of B shares a link name with A's root body, the matcher tries all bodies of B.
+    Without `choices`, the matcher searches for the signs, zero offsets and conversions for which the largest
+    number of joints and links agrees. Without `base`, the matcher starts at A's root body. For each body of
+    B, the matcher then counts the link names that also occur in A's root body. In B, the matcher starts at
+    the body with the largest count. If all counts are 0, the matcher tries all bodies of B.
     """
 
     def __init__(
@@ -175,9 +178,9 @@ class MechanismMatcher:
     def _most_matches(self, base: tuple[int, int]) -> int:
         """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
-        The number of joint pairs in two matched branches is at most the smaller number of joints. The number
-        of link pairs is at most the smaller number of links. The sum over all branches is largest if the
-        branches are matched in the order of their sizes.
+        If a branch with m joints is matched to a branch with n joints, at most min(m, n) joint pairs match.
+        The same bound holds for the links of the two branches. The sum of the bounds over all branches is
+        largest if the branches are matched in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -310,10 +313,11 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair a link of A and a link of B that are different end-effector frames of two matched bodies.
+        """Pair a link of A with a link of B that has another name and another pose.
 
-        The result is None if a link of one body already matches a link of the other body. The result is also
-        None if every link name of one body occurs in the other model.
+        The two links belong to matched bodies. For example, the links are different end-effector frames. The
+        result is None if a link of one body already matches a link of the other body. The result is also None
+        if every link name of one body occurs in the other model.
         """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
@@ -521,7 +525,7 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
     ) -> tuple[_Choice, BodyPair, Score]:
-        """Return the choice for which most links and axes agree.
+        """Return the choice for which the largest number of links and axes agrees.
 
         If several choices are equally good, the method compares later joints. For example, two axes that
         intersect at right angles allow two poses of B, so a third axis must decide.
@@ -630,10 +634,11 @@ def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> li
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad), and 0 m.
+    """Return the smallest rotation (4, 4) that makes the planes of two joints parallel.
 
-    The last value is the shift, which is always 0 for planes. The angle does not depend on the signs of the
-    normals or the distance between the planes.
+    The second result is the angle (rad) of this rotation. The angle does not depend on the signs of the
+    planes' normals or on the distance between the planes. The third result is the shift, which is always 0 m
+    for planes.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -643,7 +648,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
 
 #: Maximum number of joint orders that are tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: After this number of joint pairs, a search no longer compares joints beyond the current joint.
+#: Maximum number of later joint pairs that a search compares; see `LookAhead`.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_LOOK_AHEAD = 2000
 #: Larger angle tolerances (rad) that are tried in this order if A and B differ.
@@ -689,7 +694,10 @@ def _orders_to_try(
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
-    """Return an alignment with zero offsets that fit the mimic rules, or `best` if the new one is worse."""
+    """Align A and B again, with zero offsets that fit the mimic rules.
+
+    The result is `best` if the new alignment has more differences or a larger difference than `best`.
+    """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -728,12 +736,12 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Return an alignment from a search with larger tolerances if the alignment is better, else `best`.
+    """Repeat the alignment with larger tolerances; return the new alignment if it is better than `best`.
 
     If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
-    This function repeats the search with larger tolerances. Then the function aligns A and B with the choices
-    found and the normal tolerance, so that the result contains the small differences. An alignment is better
-    if its largest difference is less than half of the largest difference of `best`.
+    A search with larger tolerances can find these choices. Then the function aligns A and B with these
+    choices and the normal tolerance, so that the result contains the small differences. The new alignment is
+    better if its largest difference is less than half of the largest difference of `best`.
     """
     a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
@@ -766,11 +774,10 @@ def _best_alignment(
     ).find_best()
 
 
-#: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
+#: To find a zero offset that fits the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
-#: Two axes close to each other determine a zero offset inexactly.
-#: Therefore, the factor is large.
+#: The factor is large, because a zero offset from two axes that are close to each other is inexact.
 OFFSET_FACTOR = 1e4
 
 
@@ -778,13 +785,14 @@ OFFSET_FACTOR = 1e4
 class _Rule:
     """The mimic rules of two matched joints.
 
-    A's joint has the value m x + c, with a coordinate x of A. B's joint has the value n y + d, with a
-    coordinate y of B. In the alignment, B's value is s times A's value plus o (`offset`), with the sign s.
+    A's joint has the value m x + c, where x is a coordinate of A. B's joint has the value n y + d, where y is
+    a coordinate of B. In the alignment, the value of B's joint is s (m x + c) + o. The sign s is 1 or -1. The
+    zero offset o is the field `offset`.
 
     Attributes:
         slope: The product s m.
         constant: The product s c.
-        free: Whether o can have any value, because no link and no axis after the joint determines o.
+        free: True if no link and no axis after the joint determines o. In this case, o can have any value.
         has_effect: True if the joint moves matched links, or the axis of a later joint.
     """
 

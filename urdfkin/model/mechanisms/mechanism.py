@@ -7,8 +7,9 @@ body may be the root. The path from the root may cross a joint from the child li
 case, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
-different frames for the joint, and different frames for the body after the joint. Let the constant rigid
-motions M and N describe these two differences. A and B move in the same way if
+different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
+different frames for the body after the joint. The constant rigid motion N describes this second difference. A
+and B move in the same way if
 
     P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
 
@@ -27,11 +28,12 @@ displaced, S' differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
-If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
-everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with few
-exceptions. If two revolute joints have the same line as axis, only the sum of their angles matters for the
-links after them. If two consecutive prismatic joints are parallel, only the sum of their displacements
-matters.
+If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all
+joints and links, the two models have the same motion. If A and B differ at a joint or link, the motions of
+the two models usually differ. There are exceptions, for example two consecutive revolute joints whose axes
+are the same line. The poses of the links after such joints depend only on the sum of the two angles.
+Likewise, the poses of the links after two consecutive parallel prismatic joints depend only on the sum of the
+two displacements.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
@@ -131,9 +133,11 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    `before` and `behind` are the rigid motions M and N (4, 4) of the module docstring. The joint's parent
-    body in A may correspond to the joint's child body in B. Then `back` is true, and the conversion is P_b =
-    before P_a^-1 behind.
+    P_a and P_b are the poses that the joint's coordinates describe in A and B. `before` and `behind` are the
+    rigid motions M and N (4, 4) of the module docstring.
+
+    `back` is true if the joint is reversed in one model: the joint's parent body in A corresponds to the
+    joint's child body in B. If `back` is true, the formula contains the inverse of P_a instead of P_a.
     """
 
     before: FloatArray
@@ -193,9 +197,9 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
-    M must keep or reverse the plane's normal. Such a motion M consists of a translation along the normal and
-    a motion in the plane. If M reverses the normal, M also contains half a turn about x. N contains the
-    opposite translation and the same half turn.
+    M must keep or reverse the plane's normal. If M keeps the normal, M is a motion in the plane and a
+    translation along the normal. If M reverses the normal, M also contains half a turn about the x axis. N
+    contains the opposite translation and the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -217,8 +221,9 @@ class Screw:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A joint (index in the tree) between the parent body `inner` and the child body `outer`."""
+    """A joint between the parent body `inner` and the child body `outer`."""
 
+    #: Index of the joint in the tree.
     joint: int
     inner: int
     outer: int
@@ -362,12 +367,13 @@ class Mechanism:
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error (rad) of the rotations of poses that are read from a file.
+        """Rounding error (rad) of the links' rotations in a robot that was read from a file.
 
-        This error times `size` is the rounding error (m) of the positions. The parser and the writer of
-        the file round each joint's constant transform and axis. A program that merges fixed joints rounds
-        less often, because the program rounds only the product of the joints' transforms. The error includes
-        the small tilts of Pinocchio's axes (URDF514).
+        This error times `size` is the rounding error (m) of the links' positions. The program that wrote the
+        file rounded each joint's constant transform and axis, and the parser rounds these numbers again. A
+        program that merges fixed joints rounds less often, because the program rounds only the product of the
+        joints' transforms. The error includes the angles `Joint.tilt` between Pinocchio's joint axes and the
+        URDF's joint axes.
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
@@ -426,20 +432,21 @@ class MatchedJoints:
         previous: Index of the previous joint pair on the path from the base; -1 for the first pair.
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
-        before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
-            configuration.
+        before: (4, 4) constant rigid motion L before B's joint; the module docstring defines L. L is
+            expressed in A's root frame, with A in the zero configuration.
         axis_a: Screw S of A's joint in the zero configuration. Of the joint's two bodies, exp(S t) moves the
             body that is farther from the base. If A's joint is fixed, `axis_a` is the screw of B's joint.
-        axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. If B's
-            joint axis is displaced without B's later bodies, `axis_b` differs from `axis_a`. In all other
-            cases, `axis_b` is equal to `axis_a`.
+        axis_b: Screw S' of B's joint; the module docstring defines S'. S' has the positive direction of
+            `axis_a`. `axis_b` differs from `axis_a` if B's joint axis is displaced and B's later bodies are
+            not displaced. In all other cases, `axis_b` is equal to `axis_a`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
-        kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
-            differ; else "". A planar or floating joint can also have the value "kind". Such a joint is
-            reversed in one model, and the given `AlignmentChoices` contain no conversion for the joint.
-        conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
-            equal.
+        kind_difference: "a" if only A's joint is fixed, and "b" if only B's joint is fixed. "kind" if both
+            joints move and have different kinds of motion. A planar or floating joint can be reversed in one
+            model; without a conversion in the given `AlignmentChoices`, the value is then "kind". An empty
+            string in all other cases.
+        conversion: Converts coordinates of a planar or floating joint of A to coordinates of B's joint. None
+            if the coordinates are equal.
     """
 
     a: int
@@ -468,12 +475,12 @@ class FramePair:
     Attributes:
         previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
         zero_pose: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) rigid motion L after the last joint (module docstring), in A's root frame and zero
-            configuration.
+        end: (4, 4) constant rigid motion L after the last joint on the path to B's link; the module docstring
+            defines L. L is expressed in A's root frame, with A in the zero configuration.
         tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in the frame of A's link if the links are different end-effector
-            frames; else the identity.
+        tool: (4, 4) pose of B's link in the frame of A's link, for two links that are different end-effector
+            frames. For all other pairs of links, `tool` is the identity.
     """
 
     a: int
@@ -486,9 +493,9 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy of the pair in which the two links are different end-effector frames.
+        """Return a copy that treats the two links as different end-effector frames.
 
-        The copy stores the pose of B's link relative to A's link in `tool`, and reports no difference.
+        In the copy, `tool` is the pose of B's link in the frame of A's link. `tilt` and `shift` are 0.
         """
         tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
@@ -507,8 +514,8 @@ class Alignment:
         X: (4, 4) pose of B's root in A's root frame.
         steps: The joint pairs, ordered outwards from the base.
         match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest difference (m) between matched joints or links. Angles are multiplied by
-            `size_of`.
+        max_difference: Largest difference (m) of a joint pair or link pair. The difference of a pair is
+            `tilt` times `size_of`, plus `shift`.
     """
 
     a: Mechanism
@@ -540,10 +547,10 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest nonzero difference (m) between matched joints or matched links.
+        """The smallest and the largest difference (m) among the joint pairs and link pairs that differ.
 
-        If nothing differs, both values are 0. A pair of links is ignored if neither link has a child joint.
-        Angles are multiplied by `size_of`.
+        The difference of a pair is `tilt` times `size_of`, plus `shift`. If no pair differs, both values are
+        0. A pair of links is ignored if neither link has a child joint.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -570,8 +577,8 @@ class Alignment:
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `name_map`. A and B differ at each of the two pairs, or
-        at a joint or link after the pair.
+        The names of a and c occur neither in B nor in `name_map`. For each of the two joint pairs, A and B
+        differ at the joint pair, or at a later joint or link.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -624,7 +631,8 @@ class AlignmentChoices:
     Attributes:
         base: Links of A and B at which the search starts; None if the search chooses its first bodies.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
+        zeros: Sign and zero offset of each joint, by the joint's name in A: the values `sense` and `offset`
+            of `MatchedJoints`. A joint without an entry has the sign 1 and the zero offset 0.
         orders: Each entry lists some consecutive joints of B in their new order.
     """
 
@@ -657,15 +665,17 @@ class LinearFunction:
 
 @dataclass(frozen=True, slots=True)
 class MatchedValues:
-    """The values of two matched joints; B's value is converted to the direction and zero of A's joint."""
+    """The values of two matched joints, both with the positive direction and the zero of A's joint."""
 
     a: LinearFunction
     b: LinearFunction
-    #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
+    #: The value of B's joint with the direction and zero of B's URDF.
+    #: The formula is b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: In this case, `rounding` (rad or m) is the original difference between the constants of `a` and `b`.
-    #: The rounding error of one joint is subtracted from this difference, down to 0.
+    #: `rounding` (rad or m) is then max(0, D - E).
+    #: D is the absolute difference between the constants of the two computed functions.
+    #: E is the rounding error of one joint.
     #: If the functions differ by more than rounding, `rounding` is 0.
     rounding: float = 0.0
 
@@ -682,10 +692,11 @@ class Variables:
     """The values of all matched joints as linear functions of some variables, and the variables' ranges.
 
     Attributes:
-        pairs: The joint values of each joint pair; None for planar and floating joints, and for a pair of
-            different kinds.
+        pairs: The values of each joint pair. None if a joint of the pair is planar or floating. None also if
+            the two joints have different kinds and neither joint is fixed.
         ranges: Range of each variable, rad or m; infinite without a limit.
-        rules: Indices of the joint pairs with different mimic rules; one joint of a pair may be independent.
+        rules: Indices of the joint pairs whose mimic rules differ. A pair of a mimic joint and an independent
+            joint can be one of these pairs.
         coordinates: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 

@@ -26,15 +26,17 @@ configurations. The sum of the maxima then exceeds the true maximum. If A and B 
 motions L, urdfkin computes a second bound, and uses the smaller of the two bounds. The second bound is the
 sum of the distances by which each L can move the frame.
 
-**Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
-derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
-vector. The derivatives of y and d with respect to a joint value are
+**Second derivatives.** Let D = p_B - p_A, where p_A and p_B are the frame's positions in A and B. The
+function `curvature` returns upper bounds on the second derivatives of D. The function computes these bounds
+joint by joint, from the frame to the base. The derivative of a rotated vector with respect to the angle is
+the cross product of the axis u with the rotated vector. The derivatives of y and d with respect to the value
+of joint i are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
-with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A. The symbols
-S', u', o' and t' belong to the matched joint in B. A derivative is a free vector: a joint between the base
-and this joint rotates the derivative and does not translate it.
+with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of joint i in A. The symbols S',
+u', o' and t' belong to joint i in B. The derivatives y_i and d_i are free vectors. Therefore, the joints
+between the base and joint i only rotate y_i and d_i; these joints do not translate y_i and d_i.
 """
 
 from __future__ import annotations
@@ -260,7 +262,10 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Bound the angle (rad) between A and B: add the largest angle that each difference can cause."""
+    """Return an upper bound on the angle (rad) between the frame's rotations in A and B.
+
+    The bound is the sum of the largest angles that the differences between A and B can cause.
+    """
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.before)[0]
@@ -304,7 +309,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the start of the recursion (module docstring): the support functions of d and y at the frame."""
+    """Return the support functions of d and y at the frame, where the recursion starts."""
     p, end = frame.zero_pose[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point_support(grid, y - p), point_support(grid, y)
@@ -313,7 +318,7 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Apply the motions of the next joint to the support functions of d and y (module docstring)."""
+    """Return the support functions of d and y after the motions of a joint; see the module docstring."""
     # A planar or floating joint has no limits, so the joint may rotate d into any direction.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
@@ -331,7 +336,7 @@ def after_joint(
 
 
 def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
-    """Apply the constant rigid motion L to the support functions of d and y (module docstring)."""
+    """Return the support functions of d and y after the constant rigid motion L; see the module docstring."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -341,7 +346,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Apply a joint's motion, but not L, to the support function of d (module docstring)."""
+    """Return the support function of d after a joint's motion, before the rigid motion L is applied."""
     same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis_a.direction, np.zeros(3))
@@ -357,7 +362,7 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of the difference between the translations of two matched prismatic joints.
+    """Return the support function of p' - p: a prismatic joint translates by p in A, and by p' in B.
 
     The difference is largest if each joint value is at a limit.
     """
@@ -378,12 +383,12 @@ def _prismatic_difference(
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
     """Return sample values (n,) of the variable that moves a revolute joint of A and the matched joint of B.
 
-    The result is None in three cases: different variables move the two joints, more than `MOST_VALUES`
-    samples are needed, or a variable without limits has a slope other than 0, 1 and -1.
+    The result is None if two different variables move the two joints, or if more than `MOST_VALUES` samples
+    are needed. The result is also None if a variable without limits has a slope other than 0, 1 and -1.
     """
     if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges.get(name, (0.0, 0.0))  # without a range, the joints in A and B do not move
+    low, high = variables.ranges.get(name, (0.0, 0.0))  # a variable without a range moves no joint
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
@@ -408,9 +413,8 @@ def _common_difference(
     With the directions u and u' of the axes, the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P'
     - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes.
 
-    If t and t' have different slopes, the second derivative is at most the sum of two terms, one for each
-    joint. Each term is the square of the slope of t or t', times the largest distance of y from the joint's
-    axis.
+    If the slopes m of t and m' of t' differ, the second derivative is at most m^2 r + m'^2 r'. The lengths r
+    and r' are the largest distances of y from A's axis and from B's axis.
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
@@ -444,9 +448,11 @@ def _independent_difference(
 ) -> Support:
     """Return the change of d that two revolute joints cause if their angles are treated as independent.
 
-    If A and B have the same axis, a point has two positions on a circle about this axis. The distance between
-    the two positions is at most a chord of the circle. The chord belongs to the largest difference between
-    the angles in A and B. If the axes differ, the change of d is e(S' t') y - e(S t) y (module docstring).
+    If the joint has the same axis in A and B, the joint moves a point along the same circle in A and B. Let r
+    be the radius of the circle. Let a be the largest difference between the joint angles in A and B, at most
+    pi. The distance between the point's positions in A and B is at most the chord 2 r sin(a/2).
+
+    If the axes differ, the change of d is e(S' t') y - e(S t) y; the module docstring defines these symbols.
     The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
     """
     G, u = y.grid.points, step.axis_a.direction
@@ -470,8 +476,8 @@ def curvature(
 ) -> tuple[list[str], FloatArray]:
     """Return the variables' names, and bounds (m) on D's second derivatives with respect to these variables.
 
-    The bounds hold for matched joints that one variable moves by the same factor in A and B. If any other
-    pair of joints has an effect on D, all bounds are inf.
+    The bounds require that one variable moves both joints of a pair, with the same slope in A and B. If any
+    other joint pair has an effect on D, all bounds are inf.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -577,9 +583,9 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
-    A joint before the first difference of the models usually only rotates D. If the joint's variable also
-    moves a later joint of the result, the joint changes the length of D. The result begins with the first
-    such joint. Without such a joint, the result begins with the first joint that differs between A and B.
+    Let joint i be the first joint on the path that differs between A and B. A joint before joint i usually
+    does not change the length of D. An exception is a joint whose variable also moves a later joint of the
+    result. The result begins with the first exception, or with joint i if no exception exists.
     """
     steps, pairs = (
         alignment.path(frame.previous),
