@@ -20,7 +20,7 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Copy all functions of `equations`; the copies use the operations `vectors`, such as `plus` and `cross`.
+    """Copy all functions of `equations`; the copies use the given operations, such as `plus` and `cross`.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -32,7 +32,7 @@ def bind_equations(
 def rebind_functions(
     *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return copies of the functions of some modules, by name.
+    """Copy the functions of some modules; the result maps the name of each function to the copy.
 
     A copy calls other copies instead of the original functions. An entry of `replacements` replaces the
     function or the module of the same name. `decorate` is applied to each copy. List a module after the

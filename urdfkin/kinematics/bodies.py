@@ -16,11 +16,11 @@ The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook
 Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape;
 six-vectors are [linear; angular]; units are metres, radians and seconds.
 
-There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v (..., 6,
-n) gives the linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time
-derivatives of x = (position, orientation). For three Euler angles in any sequence (the textbook uses "ZYZ"),
-x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J
-is (..., 7, n).
+There are two Jacobians; the textbook warns that the two are often confused. The velocity Jacobian J_v (...,
+6, n) converts joint velocities to the linear and the angular velocity of the end frame. The manipulator
+Jacobian J converts joint velocities to x-dot, where x = (position, orientation). Another name for J is
+analytical Jacobian. For three Euler angles in any sequence (the textbook uses "ZYZ"), x has 6 numbers and J
+is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J is (..., 7, n).
 
 Functions that take an `ArrayLike` raise InputError for a wrong shape and for a value that is not finite.
 These functions also raise InputError for an axis that is not a unit vector and for a matrix that is not a
@@ -196,7 +196,7 @@ def interorigin_velocity(
     """Return the time derivative of the interorigin vector d_{i-1,i}, `d_vector` (7.73, 7.74).
 
     The derivative is w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
-    angular velocity w_0i of link i is w_{i-1,i}, and the equations are 7.66 and 7.67.
+    angular velocity w_0i of link i is w_{i-1,i}. Equations 7.73 and 7.74 then become equations 7.66 and 7.67.
     """
     rotation: FloatArray = eq.tangential(as_vectors(w_0_i, "w_0_i"), as_vectors(d_vector, "d_vector"))
     sliding: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
@@ -239,7 +239,7 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of the tool frame from the velocity of frame n.
+    """Convert the velocity of frame n to the velocity of the tool frame.
 
     The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, where `d_n_tool` (..., 3) is the vector
     from O_n to O_tool in frame 0.
@@ -251,7 +251,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from the velocity of the tool frame (7.115).
+    """Convert the velocity of the tool frame to the velocity of frame n (7.115).
 
     This function is the inverse of `tool_velocity`.
     """
@@ -296,7 +296,7 @@ def analytical_jacobian(
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121)."""
+    """Convert the manipulator Jacobian J to the velocity Jacobian J_v = C J (7.121)."""
     C = representation_matrix(representation, R)
     return C @ _rows(J, "J", C.shape[-1])
 

@@ -10,8 +10,9 @@ All vectors of an equation are expressed in the same axes: the world's axes, as 
 own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
 
 The textbook and a URDF number the frames differently. In the textbook, the offset d_{i-1,i} belongs to link i
-and follows the joint. In a URDF, the frame of a joint lies on the joint's own axis. The offset of a URDF
-belongs to link i-1 and precedes the joint. Both numberings give the same sums.
+and follows joint i. In a URDF, the frame of a joint lies on the joint's own axis. The `<origin>` of joint i
+in a URDF contains an offset that belongs to link i-1 and precedes joint i. Both numberings give the same
+sums.
 """
 
 # -- vectors ------------------------------------------------------------------------------------------
@@ -175,22 +176,25 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 # -- planar and floating joints -----------------------------------------------------------------------
-# The vector b contains time derivatives of components in the axes of the link after the joint.
-# These axes turn with the angular velocity w + o.
+# The joint's velocity is expressed in the axes of the link after the joint.
+# The vector b contains the time derivatives of the components of this velocity.
+# The axes of the link after the joint rotate with the angular velocity w + o.
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration of the link after a joint with angular velocity o.
+    """7.129: angular acceleration of the link after a planar or floating joint.
 
-    The vector b contains the time derivatives of the components of o.
+    The joint moves with the angular velocity o. The vector b contains the time derivatives of the components
+    of o.
     """
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration of a link, whose joint moves with linear velocity u and angular velocity o.
+    """7.130: acceleration of the link after a planar or floating joint.
 
-    The vector b contains the time derivatives of the components of u.
+    The joint moves with the linear velocity u and the angular velocity o. The vector b contains the time
+    derivatives of the components of u.
     """
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
@@ -214,25 +218,39 @@ def turning_column_rate(z, z_rate, d, d_rate):
 
 
 def rate_in_turning_axes(rate, w, x):
-    """Return the time derivatives of the components of x in axes that turn with w."""
+    """Return the time derivatives of the components of x in axes that rotate with the angular velocity w.
+
+    `rate` is the time derivative of x in axes that do not rotate.
+    """
     return minus(rate, cross(w, x))
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# The product of this derivative and the joint velocity, summed over the joints, is the time derivative of the
-# column (7.126).
+# Each derivative is multiplied by the velocity of its joint.
+# The sum of these products over all joints is the time derivative of the column (7.126).
 
 
 def turned_along(w, linear, angular):
-    """Return the derivative of a Jacobian column (7.85) if an earlier joint turns z and d with velocity w."""
+    """Return the derivative of the Jacobian column [linear; angular] (7.85) with respect to an earlier joint.
+
+    At the joint velocity 1, the earlier joint rotates the vectors z and d of the column with the angular
+    velocity w.
+    """
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the derivative of z x d (7.85) if a later joint moves the end of d with velocity `linear`."""
+    """Return the derivative of z x d (7.85) with respect to a later joint.
+
+    At the joint velocity 1, the later joint moves the end point of d with the velocity `linear`.
+    """
     return cross(z, linear)
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the derivative of Jacobian column 2 if the joint of column 1 moves: a spatial cross product."""
+    """Return the spatial cross product of the Jacobian columns of two joints; joint 1 is the earlier joint.
+
+    In WORLD, the product is the derivative of column 2 with respect to joint 1. In LOCAL, the product is the
+    derivative of column 1 with respect to joint 2.
+    """
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

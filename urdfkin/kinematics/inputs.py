@@ -12,13 +12,14 @@ from urdfkin.system.lazy_import import is_instance
 FloatArray = NDArray[np.float64]
 
 #: Largest accepted difference between 1 and the norm of a unit vector.
-#: A vector that is normalised in double precision deviates by 4e-16 at most.
+#: If a vector is normalised in double precision, its norm differs from 1 by at most 4e-16.
 #: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
 UNIT_TOLERANCE = 1e-12
 #: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
-#: If the entries of R are rounded to nine decimals, each has an error of 5e-10 at most.
-#: An entry of R R^T - I is then at most 1e-9 times the sum of the absolute values of a row of R.
-#: The sum of the absolute values of a row is at most sqrt(3).
+#: If R is rounded to nine decimals, every entry of R has an error of at most 5e-10.
+#: An entry of R R^T is the dot product of two rows of R.
+#: The absolute values of the entries in a row of R sum to at most sqrt(3).
+#: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
 #: The letters of NumPy's `dtype.kind` for complex numbers, bytes, text, timedelta, datetime and void.
 #: NumPy converts these kinds of data to floats without an error, although they are not real numbers.

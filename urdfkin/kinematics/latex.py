@@ -1,4 +1,7 @@
-"""LaTeX text of the textbook's equations; the functions of `equations` run with LaTeX expressions."""
+"""LaTeX text of the textbook's equations.
+
+The module calls the functions of `equations` with LaTeX expressions as arguments.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: The textbook's LaTeX symbol for a parameter of a function in `equations`, by the parameter's name.
-#: A parameter without an entry is its own symbol.
+#: The textbook's LaTeX symbols for parameters of the functions in `equations`. The keys are parameter names.
+#: If a parameter has no entry, its name is the LaTeX symbol.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -25,8 +28,8 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: LaTeX symbols for the parameters of some functions of `equations`, by the function's name.
-#: For these functions, the symbols replace the symbols in `_SYMBOLS`.
+#: LaTeX symbols that apply only to the parameters of one function. The keys are function names.
+#: An entry for a function has priority over `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -48,7 +51,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; `kind` decides whether a larger expression encloses the text in brackets."""
+    """A LaTeX expression; `kind` determines whether `text` needs brackets inside a larger expression."""
 
     text: str
     kind: int = _ATOM
@@ -114,7 +117,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX text of a term, or of a column or a matrix of terms."""
+    """Return the LaTeX text of one term, of a column of terms, or of a matrix of terms."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

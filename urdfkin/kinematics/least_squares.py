@@ -15,9 +15,10 @@ State = TypeVar("State")
 Intermediate = TypeVar("Intermediate")
 
 _MOST_STEPS = 100
-#: First, smallest and largest damping, relative to the largest singular value.
+#: Damping of the first step, smallest damping and largest damping, divided by the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: Factors of the damping after a step that reduces the error, and after a rejected step.
+#: After a step that reduces the error, the damping is multiplied by the first number.
+#: After a rejected step, the damping is multiplied by the second number.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before the step.
 _SLOW = 0.99
@@ -36,11 +37,12 @@ def least_squares(
     max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Return the state with the smallest residuals near `start`, and the norm of these residuals.
+    """Start at `start` and search for the state with the smallest residuals.
 
-    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). A step is a
-    vector (parameters,). The function rejects a step if the absolute value of a component is more than
-    `max_step`. The iteration ends after `patience` consecutive slow steps; 0 means no limit.
+    The function returns this state and the norm of its residuals. `derivatives` returns the negative
+    derivatives (rows, parameters) of the residuals (rows,). A step is a vector (parameters,). The function
+    rejects a step if the absolute value of a component is more than `max_step`. The iteration ends after
+    `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

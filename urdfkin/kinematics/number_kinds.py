@@ -3,16 +3,17 @@
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.
 
-`length_equations` computes the scale of a result, which is an upper bound on the sum of the absolute values
-of its terms. Each vector is replaced by its length or by an upper bound on its length. A difference becomes a
-sum, a cross product becomes the product of two lengths, and a rotation changes nothing. The scale is at least
-as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
-Rounding errors are not proportional to the result, because the result is small where large terms cancel.
+`length_equations` computes the scale of a result. A result is a sum of terms, and the scale is an upper bound
+on the sum of the absolute values of these terms. Each vector is replaced by its length or by an upper bound
+on its length. A difference becomes a sum, and a cross product becomes the product of two lengths. A rotation
+does not change a length. The scale is at least as large as every term, every partial sum and the result.
+Rounding errors are proportional to the scale. Rounding errors are not proportional to the result, because the
+result is small where large terms cancel.
 
 A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number. This lower bound has two reasons.
 First, a product below `SMALLEST_NORMAL` has an absolute error of up to half the smallest subnormal number.
-Second, a product of two small numbers may underflow to zero, and a later operation may multiply the lost
-product by a large number.
+Second, a product of two small numbers may underflow to zero. After a later multiplication by a large number,
+the true product may be large, but the computed product is zero.
 """
 
 from __future__ import annotations
@@ -73,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: Copies of the textbook's equations that compute scales.
-#: The arguments of the copies are lengths of vectors and absolute values of numbers.
+#: Copies of the functions in `equations`; a copy returns the scale of the equation's result.
+#: The arguments of a copy are lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,

@@ -73,8 +73,8 @@ def skew(w: ArrayLike) -> FloatArray:
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of a skew-symmetric matrix S(w) (7.26, 7.37).
 
-    An entry of the symmetric part of S that exceeds `tolerance` times the largest entry of S raises
-    InputError.
+    If an entry of the symmetric part of S exceeds `tolerance` times the largest entry of S, the function
+    raises InputError.
     """
     S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -102,8 +102,8 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
     M is a rotation matrix whose entries may be rounded to nine decimals. The method is one Newton step
     (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is
-    3e-9 at most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding
-    error.
+    3e-9 at most. Therefore, the error of the result is at most 1.4e-17. This error is an eighth of half an
+    eps (1.1e-16).
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -242,8 +242,9 @@ ExpressedIn = Literal["fixed", "body"]
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
 
-    For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
-    changes. The columns of E have length 1/2, and are perpendicular to each other and to the quaternion.
+    For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, E = 1/2 [q0 I + S(q);
+    -q^T]. The columns of E have length 1/2. The columns are perpendicular to each other and to the
+    quaternion.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -255,7 +256,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the time derivative (..., 4) of a body's quaternion from its angular velocity w (7.57)."""
+    """Convert a body's angular velocity w to the time derivative (..., 4) of the body's quaternion (7.57)."""
     return (quaternion_rate_matrix(quat, frame) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
@@ -389,8 +390,9 @@ class EulerSequence:
     """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
 
     The axes `first`, `second` and `third` turn with the body. The axis `other` is neither the first nor the
-    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `is_fixed` is true, the
-    name lists axes that are fixed in space, in the reverse order of the body's axes.
+    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `is_fixed` is True, the
+    letters of `name` are axes that are fixed in space. The order of these letters is the reverse of `first`,
+    `second`, `third`.
     """
 
     name: str
@@ -513,7 +515,7 @@ def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: Array
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56)."""
+    """Convert a body's angular velocity w to the rates Omega^-1 w of the body's Euler angles (7.56)."""
     return (euler_rate_inverse(name, angles, nearest) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
@@ -521,9 +523,10 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     """Return the matrix Omega^-1 (..., 3, 3) in closed form, from the geometry of the axes (7.56).
 
     The method expresses w in the frame after the first rotation. In this frame, the first and the second axis
-    are coordinate axes. The third axis has no component along the second axis. One component of w gives the
-    third rate, and another component gives the second rate. The remaining component and the third rate give
-    the first rate.
+    are coordinate axes. The third axis has no component along the second axis. The component of w along the
+    axis `other` gives the rate of the third angle. The component of w along the second axis is the rate of
+    the second angle. The component of w along the first axis and the rate of the third angle give the rate of
+    the first angle.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
@@ -546,10 +549,11 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
 
 
 def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the distance (radians in [0, pi/2]) of the middle angle from the singularity (gimbal lock).
+    """Return the distance (rad) between the middle Euler angle and the singularity, called gimbal lock.
 
-    A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
-    names only 0). The other sequences are singular if the middle angle is an odd multiple of pi/2.
+    The distance is in [0, pi/2]. A proper Euler sequence such as ZYZ is singular if the middle angle is a
+    multiple of pi. The textbook names only the angle 0. The other sequences are singular if the middle angle
+    is an odd multiple of pi/2.
     """
     middle = as_vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
@@ -557,11 +561,12 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega; it is 1 if the three axes are perpendicular to each other.
+    """Return the condition number of Omega: 1 if the three rotation axes are perpendicular to each other.
 
-    The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
-    and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
-    is cot(d / 2). At the singularity, the function raises RepresentationSingularityError.
+    The middle axis is perpendicular to the first and to the third axis. Let d <= pi/2 be the angle between
+    the lines of the first and the third axis. Then Omega has the singular values 1 and sqrt(1 +- cos d). The
+    condition number of Omega is cot(d / 2). At the singularity, the function raises
+    RepresentationSingularityError.
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

@@ -1,10 +1,11 @@
-"""Bounds on the rounding errors by which two correct computations differ; all tolerances use these bounds.
+"""Bounds on the difference that rounding errors cause between two correct computations.
 
-The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
-eps. Errors are counted to first order. A tolerance is `count * eps * scale`. The scale of a result is an
-upper bound on the sum of the absolute values of the terms of the result (`urdfkin.kinematics.number_kinds`).
-This module defines the counts. `urdfkin.verify.bounds` computes the scales for the forward recursion. The
-modules of `urdfkin.dh` compute the scales for Denavit-Hartenberg tables.
+All tolerances of urdfkin use these bounds. The unit of an error is eps = 2^-52 times the rounded number. Each
+operation has an error of at most half an eps. Errors are counted to first order. A tolerance is `count * eps
+* scale`. A result is a sum of terms. The scale of the result is an upper bound on the sum of the absolute
+values of these terms (`urdfkin.kinematics.number_kinds`). This module defines the counts.
+`urdfkin.verify.bounds` computes the scales for the forward recursion. The modules of `urdfkin.dh` compute the
+scales for Denavit-Hartenberg tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation of the previous link by two rotations. The
 first rotation is the joint's constant rotation. The second rotation is the joint's motion about its axis. If
@@ -17,50 +18,51 @@ first rotation is the joint's constant rotation. The second rotation is the join
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The last row is computed for the whole joint, and is not the sum of the first three rows. urdfkin's last count
-is smaller than the sum, because the worst cases of the three rows do not occur together. Pinocchio's last
-count is larger than the sum, because a rotation adds the errors of several components. The errors of urdfkin
-and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
-`tests/kinematics/test_roundings.py` computes the counts of the table. The test runs the equations on numbers
-that record each rounding.
+The last row is computed for the whole joint, and is not the sum of the first three rows. For urdfkin, the
+three rows sum to 6.1. The error of the whole joint is smaller, because the worst cases of the three rows do
+not occur together. For Pinocchio, the three rows sum to 16.0. The error of the whole joint is larger, because
+a rotation adds the errors of several components. The errors of urdfkin and of Pinocchio may have opposite
+signs, so the bound for the difference is 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes the
+counts of the table. The test evaluates the equations with objects that act as numbers and record each
+rounding error.
 
 For example, the acceleration of a frame is a sum of terms such as w x (w x d). This term has the three
-factors w, w and d. The addition of the terms and the cross products in a term have rounding errors too. In
-each implementation, the sum of these errors is at most 2 eps for each term. A term has two or three factors
-(`urdfkin.verify.bounds`). Two margins cover these errors. First, the tolerance is computed for a path with
-one additional joint. The margin of the additional joint covers the error of the frame's own offset and the
-error of the first sum. Second, `PINOCCHIO_ROUNDINGS` is 24, which is 1.5 more than 22.5. The margin of 1.5
-covers the errors of all other sums.
+factors w, w and d. The cross products in a term cause further rounding errors. The addition of the terms
+causes rounding errors as well. In each implementation, these further errors sum to at most 2 eps for each
+term. A term has two or three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the
+tolerance is computed for a path with one additional joint. The margin of the additional joint covers the
+error of the frame's own offset and the error of the first sum. Second, `PINOCCHIO_ROUNDINGS` is 24, which is
+1.5 more than 22.5. The margin of 1.5 covers the errors of all other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
-axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
-multiplied by the inverse rotation of each joint before link k. A term of link k, such as w x (w x d), is
-multiplied by the rotation of each joint between link k and the frame. Finally this term is multiplied once by
-R, the product of all rotations. For w x (w x d), the number of rotations is at most three times the number of
-joints of the path. This limit holds in the world's axes and in a link's axes.
+rotates the axis z and the offset R d of every later joint once. In a link's axes, the inverse rotation of
+each joint before link k multiplies the angular velocity w of link k. A term of link k, such as w x (w x d),
+is multiplied by the rotation of each joint between link k and the frame. Finally this term is multiplied once
+by R, the product of all rotations. For w x (w x d), the number of rotations is at most three times the number
+of joints of the path. This limit holds in the world's axes and in a link's axes.
 
-If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. For
-each joint, let A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant
-rotation by A. urdfkin also multiplies the constant rotation by the inverse of the rotation A of the previous
-joint. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the result depends on the length of the
-axis. If all 340 rounding errors have the same sign, the total error is 41. `PINOCCHIO_ROUNDINGS` does not
-cover this worst case. If each rounding error is uniformly distributed over its range, the standard deviation
-of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times this standard deviation.
+If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. Let
+R_i be the constant rotation of joint i, and let A_i be the rotation that turns z to the axis of joint i.
+urdfkin computes A_{i-1}^-1 R_i A_i. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
+result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
+41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over
+its range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times
+this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
 2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t increases
-the error of each factor of a term by 2 t / eps, in units of eps. This increase applies to all frames after
-the joint. If a tilt is larger than eps, urdfkin reports the finding URDF514.
+at most 2 t. The bound 2 t holds for all vectors after this joint. Therefore, the allowed difference of each
+factor of a term increases by 2 t. In units of eps, this increase is 2 t / eps. The increase applies to all
+frames after the joint. If a tilt is larger than eps, urdfkin reports the finding URDF514.
 
 **An export.** Exported code (`urdfkin.export`) computes the same equations, but omits multiplications by 0
-and by 1. An export also omits small constants. An entry of a constant rotation matrix is small if it is less
-than half an eps of the largest entry in its row. A component of an offset is small if it is less than half an
-eps of the largest component. Each omission causes an error of half an eps, but the rounding errors of one
-product and one sum disappear. The compiler decides whether products and sums are fused. An export uses the
-sine and cosine of a library. Only batches in C use polynomials with an error of one eps; three subtractions
-reduce the polynomials' angle.
+and by 1. An export also omits small constants. An entry of a constant rotation matrix is small if the entry
+is less than half an eps of the largest entry in the same row. A component of an offset is small if the
+component is less than half an eps of the largest component. Each omission causes an error of half an eps, but
+the rounding errors of one product and one sum disappear. The compiler decides whether products and sums are
+fused. An export uses the sine and cosine of a library. Only batches in C use polynomials with an error of one
+eps; three subtractions reduce the polynomials' angle.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -81,17 +83,17 @@ The counts of an export's joint are
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
 offset's length. In matrix rows and cross products, an export omits each product that contains an omitted
-component. The error of this omission is smaller than 1.5, the rounding error of these products. Without fused
+component. These products would have a rounding error of 1.5. The omission has a smaller error. Without fused
 multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint. The errors of
 the sums over the joints are added to this difference. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these
 sums. The standard deviation of the error is the same for an export and for urdfkin. Test vectors contain true
-values. If an export is compared with test vectors, the error is at most 7.2 eps, which is within
-`PINOCCHIO_ROUNDINGS`.
+values. Therefore, the difference between an export and test vectors is at most 7.2 eps. This difference is
+within `PINOCCHIO_ROUNDINGS`.
 
 **Single precision.** An export in single precision has a separate bound for each number of a test vector. The
-unit is eps = 2^-23. The value of each operation and of each constant has a rounding error.
-`urdfkin.export.function` multiplies each error by the derivative of the result with respect to the operation
-or constant. The bound is the sum of the absolute values of all these products. The error of one operation is
+unit is eps = 2^-23. Let x be the value of an operation or of a constant. Then x has a rounding error.
+`urdfkin.export.function` multiplies this rounding error by the derivative of the result with respect to x.
+The bound is the sum of the absolute values of these products for all x. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -121,13 +123,13 @@ Together with urdfkin's error of 5.7, the bound for the difference is 27.2. `MUJ
 2.8 more than 27.2. The margin of 2.8 covers the errors of the sums over the joints. MuJoCo does not replace
 the file's axes by coordinate axes.
 
-**Mimic joints.** A mimic joint adds no rounding error. urdfkin and the oracle compute a mimic joint's angle
-m q + c from the same doubles m and c. Both programs round the multiplication and then the addition, so IEEE
-754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle
-combine the rules in the same order. Both programs start with the rule that refers to the independent joint.
-The errors of sine and cosine are counted above. The functions sine and cosine first subtract multiples of
-pi/2 from the angle; this subtraction is exact for every angle, also for 1e12 rad. Therefore a mistake in a
-mimic joint's angle is always detected.
+**Mimic joints.** A mimic joint adds no rounding error. The angle of a mimic joint is m q + c. urdfkin and the
+oracle compute this angle from the same doubles m and c. Both programs round the multiplication and then the
+addition, so IEEE 754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin
+and the oracle combine the rules in the same order. Both programs start with the rule that refers to the
+independent joint. The table of a joint contains the errors of sine and cosine. The functions sine and cosine
+first subtract multiples of pi/2 from the angle. This subtraction is exact even for an angle of 1e12 rad.
+Therefore a mistake in a mimic joint's angle is always detected.
 
 **A base.** `urdfkin.BaseMotion` gives the robot's root link a pose in the world. A base with a rotation M
 counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
@@ -166,8 +168,9 @@ of mimic rules between the mimic joint and the independent joint.
 at most 2^-1075. This number is half the smallest subnormal number, or (eps/2) times the smallest normal
 number. Therefore, every scale except 0 is at least the smallest normal number
 (`urdfkin.kinematics.number_kinds`). With this scale, the tolerance `count * eps * scale` is larger than the
-error 2^-1075. The tolerance is also large enough if the product is multiplied by large numbers later. The
-smallest unit is eps times the smallest normal number, 2^-1074.
+error 2^-1075. If a later operation multiplies the product by a large number, the error and the scale grow by
+the same factor. The tolerance is therefore still large enough. The smallest unit is eps times the smallest
+normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has an error of at most 8:
 
@@ -196,26 +199,27 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: Smallest positive value of the unit `eps * scale`; it is the smallest subnormal number.
+#: The unit `eps * scale` of an error is 0 or at least this number, which is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: Allowed difference (in eps) from Pinocchio for one joint and one factor of a term.
-#: For example, the term w x (w x d) has three factors.
+#: urdfkin and Pinocchio may differ by joints * factors * PINOCCHIO_ROUNDINGS * eps * scale.
+#: `factors` is the number of factors of a term: for example, the term w x (w x d) has three factors.
 PINOCCHIO_ROUNDINGS = 24.0
-#: Allowed difference (in eps) from MuJoCo for one joint and one factor of a term.
-#: For example, the term w x (w x d) has three factors.
+#: urdfkin and MuJoCo may differ by joints * factors * MUJOCO_ROUNDINGS * eps * scale.
+#: `factors` is the number of factors of a term: for example, the term w x (w x d) has three factors.
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW_ROUNDINGS = 8.0
 
-# Errors in exports in single precision (`urdfkin.export.function`); the docstring derives the errors.
+# Rounding errors of exports in single precision (`urdfkin.export.function`).
+# The section "Single precision" of the docstring above derives these errors.
 
 SINGLE_EPS = 2.0**-23
-#: In single precision: the smallest normal number and the largest number.
+#: Smallest normal number and largest number in single precision.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
 #: Relative error (in eps) of each operation.
 SINGLE_OPERATION = dict.fromkeys("+-*", 0.5) | {"/": 1.0, "sqrt": 1.0, "neg": 0.0, "sin": 3.5, "cos": 3.5}
@@ -224,38 +228,43 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
-#: The worst case is 18.9 eps, which is the sum of four numbers in the docstring's first table.
-#: These numbers are in the rows for the product and for the constant rotation.
-#: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
+#: Two programs can compute different constant poses from the same file.
+#: This number is the allowed difference (in eps per joint).
+#: If all rounding errors have the same sign, the difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
+#: The first table of the docstring above contains these four errors of constant rotations and their products.
+#: The standard deviation of the difference is 2.4 eps, so 13.7 is nearly six standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
-#: Error (in eps) of the directions of two joint axes.
-#: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
+#: Sum of the rounding errors (in eps) in the directions of two joint axes.
+#: For each axis, the division by the axis's length has an error of 0.5.
+#: Rodrigues' formula adds an error of 2.0 for each axis.
 AXIS_ROUNDINGS = 5.0
-#: Error (in eps) of each joint in a file, because a program rounded the numbers when it wrote the file.
+#: Error (in eps) of the angle between consecutive joint axes, for each joint.
+#: The program that wrote a robot's file rounded the angles in this file.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
 #: Roll and pitch both change the angle between a joint's z axis and the z axis of the joint before it.
 #: Yaw does not change this angle.
-#: Therefore, the error of 22.5 eps counts twice.
+#: Therefore, the error is twice 22.5 eps.
 FILE_ROUNDINGS = 45.0
-#: Error of a length along an axis, in units of eps times the length of the path.
-#: A dot product has an error of 2.4 eps; each sum of lengths has an error of 0.5 eps times the sum.
-#: Only a few of these sums are nearly as large as the path's length.
+#: Rounding error of a length along a joint axis.
+#: The unit of the error is eps times the length of the path.
+#: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
+#: Only a few of these sums are nearly as large as the length of the path.
 LENGTH_ROUNDINGS = 4.0
 
 # Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
-#: Error (in eps) of an angle up to pi.
+#: Rounding error (in eps rad) of an angle between -pi and pi.
 #: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
 #: A number in a file has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
-#: The entry is a difference of two products, which has an error of 0.75.
-#: In each of these products, one factor is a difference of two products.
+#: The entry is a difference of two products. This difference causes an error of 0.75.
+#: In each of the two products, one factor is a difference of two other products.
 #: This factor adds an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
-#: Allowed change when a length is rounded to twelve digits, in units of eps times the length of the path.
+#: A length is rounded to twelve digits if the length changes by at most this number.
+#: The unit of the change is eps times the length of the path.
 DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
@@ -274,10 +283,11 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (in eps) between urdfkin and Pinocchio, for each factor of a term.
+    """Return the allowed difference (in eps) between urdfkin and Pinocchio for a term with one factor.
 
-    For example, the term w x (w x d) has three factors. `joints` is the number of joints on the path. `tilt`
-    is the sum over these joints of the angle (radians) between Pinocchio's axis and the file's axis.
+    For a term with several factors, the allowed difference is multiplied by the number of factors. For
+    example, the term w x (w x d) has three factors. `joints` is the number of joints on the path. `tilt` is
+    the sum over these joints of the angle (radians) between Pinocchio's axis and the file's axis.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
@@ -296,7 +306,7 @@ def table_roundings(rows: int) -> float:
 def read_back_roundings(rows: int) -> float:
     """Return the allowed difference (in eps) between a table and the URDF that was written from the table.
 
-    The pose from the table and Pinocchio's pose from the URDF have the error `table_roundings(rows)` each.
+    The table's pose has the error `table_roundings(rows)`. Pinocchio's pose of the URDF has the same error.
     The conversion to roll, pitch and yaw has twice this error.
     """
     return 4.0 * table_roundings(rows)

@@ -96,8 +96,8 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or text must contain all names. If a text begins with the name of a pose, the text needs only
-    the values that differ from the pose.
+    A mapping or a text must contain a value for every name. Exception: a text that begins with the name of a
+    pose contains only the values that differ from the pose.
 
     Methods that compute a quantity share these arguments:
 
@@ -106,9 +106,11 @@ class Robot(Displayable):
       moving frame.
     - `a`: (..., nv) rad/s^2, m/s^2; expressed in the same axes as `v`.
     - `frame`: Name of a link or joint; None: the robot's only tip. For a list of names, such as
-      `link_frames`, the result has an axis of frames after the batch axes.
-    - `reference`: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's origin, in
-      the frame's axes. WORLD: at the body point that coincides with the world origin, in world axes.
+      `link_frames`, the result has one more array axis after the batch axes. The index along this axis
+      selects the frame.
+    - `reference`: Reference frame of the result. LOCAL_WORLD_ALIGNED: linear motion of the frame's origin,
+      expressed in world axes. LOCAL: linear motion of the frame's origin, expressed in the frame's axes.
+      WORLD: linear motion of the body point that coincides with the world origin, expressed in world axes.
     - `base`: Motion of the root link; None: fixed at the world origin.
     - `out`: Output array, C-contiguous float64 of the result's shape; the contents are undefined after an
       error.
@@ -166,8 +168,9 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Evaluators of `prepare`, by frame. Pinocchio checks only the results of evaluators in `_checked`.
+        #: Cached evaluators. Pinocchio does not check the results of these evaluators.
         self._prepared: dict[object, PreparedFrame] = {}
+        #: Cached evaluators. Pinocchio checks each result of these evaluators.
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
@@ -383,9 +386,10 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the tip in the robot catalogue, or a leaf link.
+        """Name of the default tip frame, which `chain`, `dh` and `export` use.
 
-        The leaf link has the most degrees of freedom on the path from the root to this link.
+        The robot catalogue defines the tip frame of some robots. For all other robots, the tip frame is a
+        leaf link. The path from the root link to this leaf link has the most degrees of freedom.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -411,9 +415,10 @@ class Robot(Displayable):
 
     @property
     def joints(self) -> JointTable:
-        """All joints by name, fixed joints included, in Pinocchio's order: kind, axis, limit, mimic rule.
+        """A dict of all joints by name, in Pinocchio's order; the dict contains fixed joints too.
 
-        The result is a dict of `Joint`; `print` and notebooks show it as a table.
+        Each value is a `Joint`, for example with an axis, limits and a mimic rule. `print` and notebooks show
+        the dict as a table.
 
         >>> import urdfkin
         >>> joint = urdfkin.load("planar_two_link").joints["joint_2"]
@@ -424,7 +429,9 @@ class Robot(Displayable):
 
     @property
     def frames(self) -> dict[str, str]:
-        """The link of each frame, by the frame's name; a joint's frame belongs to the joint's child link.
+        """A dict that maps each frame's name to the name of a link; the frame is fixed to this link.
+
+        The frame of a joint is fixed to the child link of the joint.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").frames["joint_2"]
@@ -437,7 +444,8 @@ class Robot(Displayable):
     def limits(self) -> FloatArray:
         """(2, nq) lower and upper limits of `q`, rad, m; infinite for a joint without limits.
 
-        The array does not contain the limits of mimic joints; `limit_violations` checks these limits too.
+        The array does not contain the limits of mimic joints. `limit_violations` also checks the limits of
+        mimic joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limits.tolist()
@@ -481,8 +489,8 @@ class Robot(Displayable):
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, the limits of a mimic joint allow at most
-        one value of the mimicked joint. In this case, the configurations respect only the limits of the
-        mimicked joint. `limit_violations` then reports the mimic joint.
+        one value of the mimicked joint. The configurations of such a robot respect the limits of the mimicked
+        joint, but may exceed the limits of the mimic joint. `limit_violations` then reports the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -625,10 +633,10 @@ class Robot(Displayable):
         return self.verifier.make_pinocchio_model(mimic=as_bool(mimic, "mimic"))
 
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
-        """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
+        """Convert a configuration of the Pinocchio model to `q` (..., nq).
 
-        Angles of continuous joints are in [-pi, pi]. `from_pinocchio(to_pinocchio(q))`
-        returns the angles `-math.pi` and `math.pi` unchanged.
+        This method is the inverse of `to_pinocchio`. In the result, angles of continuous joints are in [-pi,
+        pi]. `from_pinocchio(to_pinocchio(q))` returns the angles `-math.pi` and `math.pi` unchanged.
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
@@ -644,7 +652,9 @@ class Robot(Displayable):
         return configuration.from_pinocchio(self.tree, as_finite(q, "q"), mimic=as_bool(mimic, "mimic"))
 
     def convention(self, name: str | Path | Convention, joints: Sequence[str] | None = None) -> Conversion:
-        """Return the conversion of q, v, a, Jacobians and six-vectors to a program's convention, and back.
+        """Return the conversion between urdfkin's convention and another program's convention.
+
+        The conversion applies to q, v, a, Jacobians and six-vectors, in both directions.
 
         Args:
             name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
@@ -737,7 +747,9 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Compute a quantity, selected by its name; the method of the quantity returns the same result.
+        """Compute the quantity with the given name, for example "velocity".
+
+        The method of the quantity, for example `velocity`, returns the same result.
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
@@ -889,11 +901,11 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
-        In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
-        In LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in
-        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. Let p' and w be the linear and the
-        angular part of `velocity` in the same reference frame. The linear part of the spatial acceleration is
-        that of the classical acceleration minus w x p'. J a + J-dot v does not contain the acceleration that
+        In LOCAL_WORLD_ALIGNED, J a + J-dot v is the classical acceleration, which `acceleration` returns. In
+        LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in LOCAL
+        and WORLD, J a + J-dot v is the *spatial* acceleration. Let p'' be the linear part of `acceleration`.
+        Let p' and w be the linear and the angular part of `velocity`. In the same reference frame, the linear
+        part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not contain the acceleration that
         a moving base causes.
 
         >>> import urdfkin
@@ -962,12 +974,13 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the classical acceleration of a frame (..., 6), [linear; angular].
 
-        The linear part is p'', the second derivative of the position of the frame's origin. The spatial
-        acceleration is p'' - w x p'. Pinocchio's function for the classical acceleration is
-        `getFrameClassicalAcceleration`. The result does not include gravity; `imu` does.
+        The linear part is p'', the second derivative of the position of the frame's origin. The linear part
+        of the spatial acceleration is p'' - w x p'. Pinocchio's function for the classical acceleration is
+        `getFrameClassicalAcceleration`. Gravity has no effect on the result; the result of `imu` includes
+        gravity.
 
-        In LOCAL_WORLD_ALIGNED the result equals J a + J-dot v, with `jacobian` and `jacobian_rate`.
-        `acceleration_breakdown` lists the contribution of each joint.
+        In LOCAL_WORLD_ALIGNED and without `base`, the result is J a + J-dot v. Here `jacobian` returns J, and
+        `jacobian_rate` returns J-dot. `acceleration_breakdown` lists the contribution of each joint.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1028,7 +1041,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> SingularValues:
-        """Return the singular values of `jacobian` with guaranteed bounds, condition and manipulability.
+        """Return singular values, condition number and manipulability of `jacobian`, with guaranteed bounds.
 
         The bounds include the rounding errors of J and of the decomposition. Columns of J that are 0 for
         every q are left out. LOCAL and LOCAL_WORLD_ALIGNED have the same singular values. `rows="all"` mixes
@@ -1381,8 +1394,8 @@ class Robot(Displayable):
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. `module(q)` returns the first quantity that depends only on q, such as
-                the placement.
+            quantities: As in `export`. A call of the module returns the quantity with the fewest inputs. If
+                several quantities have only the input q, the call returns the first of these quantities.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1473,14 +1486,15 @@ class Robot(Displayable):
             near_parallel: "hayati": rows of nearly parallel axes have a fifth parameter, beta. "strict": all
                 rows have only the four parameters.
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
-            last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
-                tool transform leads from the flange to the tip.
-            parallel_offset: Rule for the offsets d of consecutive parallel axes. "last": the row of the last
-                axis contains the sum of the offsets. "first": the row of the first axis contains the sum.
-                "each": each row contains the offset of its own link.
+            last: "tip": the last row ends at the tip if its four parameters suffice. "flange": the last row
+                ends on the last joint axis, and the tool transform leads from this axis to the tip.
+            parallel_offset: Rule for the offsets d along consecutive parallel axes. "last": the row of the
+                last of these axes contains the sum of the offsets. "first": the row of the first of these
+                axes contains the sum of the offsets. "each": each row contains the offset of this row's link.
             flip: Names of joints whose positive direction is reversed in the table.
-            first: "base": d_1 and theta_1 contain the transform from the base to the first axis if possible.
-                "joint": d_1 and theta_1 are 0, and the table's base contains this transform (Craig's choice).
+            first: "base": d_1 and theta_1 contain the offset along the first axis and the rotation about this
+                axis. "joint": d_1 and theta_1 are 0, and the table's base transform contains the offset and
+                the rotation (Craig's choice).
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
@@ -1601,7 +1615,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree for links, given by index; the robot caches each compiled tree."""
+        """Return the compiled tree for some links, and cache this tree; `links` contains link indices."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1653,7 +1667,7 @@ class Robot(Displayable):
         verify: Verify | None,
         threads: int | None,
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for a call, or None if it does not support the call."""
+        """Return the fast evaluator for a call, or None if no fast evaluator supports the call."""
         policy = self.verifier.policy if verify is None else verify
         if base is not None or threads is not None or (policy is not True and policy is not False):
             return None
@@ -1667,8 +1681,9 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # The key is a plain name where possible, because the hash of an enumeration member is slow.
-        # All other keys contain the type of `frame`.
+        # For a plain str and the default reference, the key is this str.
+        # The key then contains no enumeration member, because hashing an enumeration member is slow.
+        # Every other key contains the class of `frame`, for example `LinkFrame`.
         # `LinkFrame("link:a")` is equal to the str "link:a", but the two can name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
@@ -1691,9 +1706,10 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 def _merge_shared_items(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
-    """Return a method's docstring, completed with the arguments and errors in `shared` and `errors`.
+    """Return a method's docstring with complete sections Args, Returns and Raises.
 
-    The shape, the units and the equations of the result come from `QUANTITIES`.
+    `shared` contains the descriptions of arguments, and `errors` contains the descriptions of errors. The
+    shape, the units and the equations of the result come from `QUANTITIES`.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

@@ -43,12 +43,12 @@ class ConventionRobot:
 
     @property
     def nq(self) -> int:
-        """Length of q in the target program."""
+        """Number of elements of q in the target program."""
         return self.conversion.nq
 
     @property
     def nv(self) -> int:
-        """Length of v and a in the target program."""
+        """Number of elements of v, and of a, in the target program."""
         return self.conversion.nv
 
     @property
@@ -135,7 +135,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], inputs: tuple[Any, ...], *arguments: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Call a method of `Robot`; return the inputs in urdfkin's convention, and the result."""
+        """Convert the inputs to urdfkin's convention; return the converted inputs and the method's result."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", inputs, strict=False)

@@ -1,7 +1,7 @@
-"""Compute the motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
+"""Compute the motion of one frame along a trajectory, and compare the motion with Pinocchio.
 
-The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and Pinocchio disagree, the methods of
-`Robot` raise an error, but `frame_motion` returns the disagreement.
+Plots and viewers show this motion. The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and
+Pinocchio disagree, the methods of `Robot` raise an error, but `frame_motion` returns the disagreement.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ class MotionCheck:
 
     Attributes:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
-            The factor eps is the machine epsilon. The factor scale bounds the sum of the absolute values of a
-            number's terms (`urdfkin.verify.bounds`).
+            Here eps is the machine epsilon. Each number of the quantity is a sum of terms. The scale of the
+            number is an upper bound on the sum of the absolute values of these terms
+            (`urdfkin.verify.bounds`).
         bound_ratio: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
-        bound: (n,) largest difference that rounding can cause, divided by the same eps * scale.
+        bound: (n,) largest difference that rounding errors can cause in each sample, divided by eps * scale.
     """
 
     units: FloatArray

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of each array without the first axis, which is the index of the sample.
+#: Shape of one sample in each array, by the array's name: for example, `(nq,)` for q (n, nq).
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -117,13 +117,16 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _MIN_SAMPLES = 3
 #: Names of the .npz arrays for the pose, the velocity and the acceleration of the root link.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: The user gets a note if the rounding error of times exceeds this fraction of the smallest time step.
+#: The user gets a note if the times are rounded by more than this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectorySamples:
-    """The n samples in a file, in urdfkin's convention, not unwrapped; a missing array is None."""
+    """The samples in a file, converted to urdfkin's convention.
+
+    The angles are not unwrapped. An array that the file lacks is None.
+    """
 
     where: str
     q: FloatArray
@@ -145,7 +148,8 @@ class Trajectory:
         rates_source: How v and a were obtained, such as "by central differences".
         exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a were
             read from a file or computed by central differences; see `errors`.
-        notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
+        notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
+            unwrapped.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
             if there are too few samples.
@@ -483,7 +487,7 @@ _SUFFIXES = (
 
 
 def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column that a heading names, and the unit in the heading, as `_parse_unit` does.
+    """Return the column name and the unit in a heading; the unit is "" for an SI unit.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -598,11 +602,12 @@ def _check_columns(
         )
 
 
-#: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
+#: If the angles of a joint differ by more than this number (rad), the angles are not wrapped.
+#: The number is one turn, plus a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
-#: A rotation in the opposite direction leads to the same pose.
-#: The angle of this opposite rotation is then less than twice as large.
+#: For example, rotations by 130 and by -230 degrees lead to the same pose.
+#: Above 120 degrees, the longer rotation is less than twice as large as the shorter rotation.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
 #: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.

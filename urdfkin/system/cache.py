@@ -84,7 +84,8 @@ _warned: set[str] = set()
 def _unsafe_reason(folder: Path) -> str | None:
     """Return the reason why another user could have written to a folder, or None.
 
-    A user who can write to a parent folder without the sticky bit can replace the folder.
+    The function also checks the parent folders. If a parent folder has no sticky bit, every user who can
+    write to the parent folder can replace the folder.
     """
     me = os.geteuid()
     for path in (folder, *folder.parents):

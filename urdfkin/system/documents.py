@@ -149,7 +149,10 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the JSON path and a description of an entry of `data` that `document` lacks, or None."""
+    """Return the JSON path and a description of the first unknown entry in `data`, or None.
+
+    An entry is unknown if `document`, the result of the conversion of `data`, does not contain the entry.
+    """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"

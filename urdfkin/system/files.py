@@ -69,7 +69,7 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """Return at most the first `count` bytes of a file; `pipes` is as in `read_bytes`."""
+    """Return the first bytes of a file, at most `count` bytes; `pipes` is as in `read_bytes`."""
     try:
         # Without O_NONBLOCK, opening a pipe blocks until a writer opens the pipe.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)

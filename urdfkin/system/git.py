@@ -1,7 +1,7 @@
 """Read files of an older version of a git repository.
 
-The module uses only git commands that read git objects. Commands that read the working tree (`diff`,
-`status`) run external programs, and the settings of an untrusted repository could name any program.
+The module uses only git commands that read git objects. Commands that read the working tree, such as `diff`
+and `status`, can run external programs. The settings of an untrusted repository could name any program.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ class CommitFiles:
 
     Attributes:
         files: Git's digest of the content of each file. The key is the path of the file relative to `root`.
-        missing_names: Names, without folders, of files that the commit contains and the working tree lacks.
+        missing_names: File names that the commit contains and the working tree lacks. The names do not
+            include folders.
     """
 
     root: Path
@@ -60,7 +61,7 @@ class CommitFiles:
 
 
 def merge_base_files(reference: str, folder: Path) -> CommitFiles:
-    """Return the merge base of HEAD and a branch, tag or commit, or raise SourceError."""
+    """Return the files of the merge base of HEAD and a branch, tag or commit; may raise SourceError."""
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:
         commit = _text(

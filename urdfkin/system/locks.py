@@ -1,6 +1,6 @@
 """Locks that are unlocked in a child process after a fork.
 
-A fork copies all locks, but it copies only the thread that calls `fork`. A lock that another thread holds
+A fork copies all locks, but only one thread: the thread that calls `fork`. A lock that another thread holds
 would stay locked in the child for ever. `import urdfkin` imports this module first, so this module imports
 nothing that an untrusted current folder could replace.
 """
@@ -11,7 +11,7 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: Locks that a thread acquired before a fork, by the identifier of the thread.
+#: The locks that a thread acquired before its fork. The key is the identifier of the thread.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 
@@ -46,8 +46,8 @@ def _after_fork() -> None:
 class ImportLock:
     """The lock that a thread holds during a lazy import.
 
-    Without this lock, another thread could fork a child during the import, and the child would wait for ever
-    for the end of the import.
+    Without this lock, another thread could fork a child process during the import. The child process would
+    then wait for ever for the end of the import.
 
     A fork also acquires the lock of `logging`, because `logging` calls `os.register_at_fork`. A thread that
     holds the import lock may need the lock of `logging` during the import. To avoid a deadlock, a fork must

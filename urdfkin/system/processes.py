@@ -1,8 +1,8 @@
 """Child processes, and threads with a large stack.
 
-The current folder may contain untrusted files. Python's options -c and -m search the current folder for
-modules first, so a file `json.py` beside a robot would be run. Child processes of urdfkin therefore do not
-import from the current folder. Libraries also search the current folder for settings files.
+The current folder may contain untrusted files. With the options -c and -m, Python searches the current folder
+for modules first. Python would therefore run a file `json.py` beside a robot. Child processes of urdfkin
+therefore do not import from the current folder. Libraries also search the current folder for settings files.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ def _import_path() -> list[str]:
 
 
 def _is_dask_folder(entry: str) -> bool:
-    """Return whether an entry is Dask's temporary folder, to which other users can write."""
+    """Return whether an entry of `sys.path` is in Dask's temporary folder.
+
+    Other users can write to this folder.
+    """
     return any(part.startswith("dask-scratch-space") for part in Path(entry).parts)
 
 
@@ -105,7 +108,7 @@ _stack_size_lock = make_fork_safe_lock()
 
 
 def call_with_stack(size: int, function: Callable[[], _T]) -> _T:
-    """Return `function()`, called on a stack of at least `size` bytes.
+    """Call `function` on a stack of at least `size` bytes, and return the result.
 
     Pinocchio and its parser are recursive: a chain of about 3,000 links overflows a stack of 8 MiB.
     """

@@ -20,8 +20,8 @@ from urdfkin.kinematics.latex import latex
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
 #: Numbers of the equations whose statements are unknown.
-#: Page 2 of the textbook's chapter, which contains these equations, is lost.
-#: Equation 7.7 of this page is known, because section 7.2 repeats the equation.
+#: Page 2 of the textbook's chapter, which contains the equations 7.6 to 7.10, is lost.
+#: Equation 7.7 is known nevertheless, because section 7.2 repeats equation 7.7.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -44,7 +44,8 @@ class Equation:
 
     Attributes:
         statement: The equation in urdfkin's notation, in plain characters.
-        definitions: Names of the functions of `urdfkin.kinematics.equations` that state the equation.
+        definitions: Names of the functions in `urdfkin.kinematics.equations` that contain the equation's
+            formula.
         functions: Functions that compute the equation, as "module:name".
         tests: Tests that fail if the equation is computed wrongly, as "file::name".
         oracle: The independent source with which the tests compare the result.
