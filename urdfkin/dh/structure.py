@@ -39,7 +39,8 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Smaller singular values count as zero; rounding errors are far below this number.
+#: Singular values below this number count as zero.
+#: Rounding errors of singular values are far below this number.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).
@@ -277,7 +278,10 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
+    """Return the tip's positions at random joint values, and the Jacobian at the first of these samples.
+
+    Mimic rules are ignored, so every joint moves independently.
+    """
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]

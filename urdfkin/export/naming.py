@@ -1,7 +1,7 @@
-"""Convert names of a URDF to identifiers, and to text for comments, that are valid in every language.
+"""Convert the names in a URDF to identifiers and comments for exported code.
 
-Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
-identifier is a keyword.
+The identifiers and comments are valid in every language. Identifiers are short, ASCII and unique. The
+exported code adds a prefix such as `s_` or `q_`, so that no identifier is a keyword.
 """
 
 from __future__ import annotations

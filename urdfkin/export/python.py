@@ -118,7 +118,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
     """Return a function for `Dialect.first_lines`.
 
-    The exported code checks the length of each input of one configuration.
+    The exported code computes one configuration, and checks the number of entries of q, v and a.
     """
 
     def first_lines(writer: Writer) -> list[str]:
