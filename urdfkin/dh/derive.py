@@ -56,7 +56,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class DerivationOptions:
-    """The options of a derivation; `urdfkin.dh.make.make_dh_table` explains them."""
+    """Options for the derivation of a table; `urdfkin.dh.make.make_dh_table` explains each option."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -225,7 +225,8 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # x is e - (e . z) z for the base's x axis e. This form has no cancellation if z is close to e.
+    # The projection of the base's x axis e is x = e - (e . z) z.
+    # The expression below equals x, and has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:

@@ -73,7 +73,7 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference from a reference; the smallest key is best."""
+    """Return a key for sorting tables: the closest table to the reference table has the smallest key."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach

@@ -410,7 +410,10 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping with the keys of a TOML file (`urdfkin.dh.rows` shows them)."""
+    """Make a table from a mapping that has the keys of a TOML file.
+
+    The docstring of the module `urdfkin.dh.rows` shows the keys.
+    """
     if "convention" not in data:
         raise InputError(
             "the table does not name its convention",

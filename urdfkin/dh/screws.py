@@ -60,7 +60,7 @@ class ScrewJoint:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProductOfExponentials(Displayable):
-    """A robot's path as a product of exponentials; `print` and notebooks show it as tables.
+    """A robot's path as a product of exponentials; `print` and notebooks show the product as tables.
 
     Attributes:
         joints: The joints, base to tip.
@@ -106,7 +106,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the path's coordinates to its joints' values.
+        """The map from the path's coordinates to the values of the path's joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names

@@ -184,7 +184,10 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Multiply rotations about coordinate axes, with each angle snapped within `tolerance`."""
+    """Snap the angles of rotations about coordinate axes, and multiply the rotations.
+
+    `tolerance` (rad) is the largest change of an angle.
+    """
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)

@@ -1,4 +1,4 @@
-"""Find the structure of an arm, and export it for closed-form inverse kinematics solvers.
+"""Find the structure of an arm, and export the structure for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
 point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
@@ -161,7 +161,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and its distance (m) from the farthest axis."""
+    """Return the least-squares intersection of axes, and the distance (m) from there to the farthest axis."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -244,7 +244,7 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
 
 
 def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
-    """Return the point from which the reach is measured, in the base frame (m), and its description."""
+    """Return the point (m, base frame) from which the reach is measured, and a text that names the point."""
     if not screws.joints or not screws.joints[0].kind.turns:
         return np.zeros(3), "the base's origin"
     if len(screws.joints) > 1 and screws.joints[1].kind.turns:

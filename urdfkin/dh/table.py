@@ -62,8 +62,8 @@ class DHRow:
     """One row of a table: the constant parts of one joint's parameters, in metres and radians.
 
     Attributes:
-        a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
-        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified one.
+        a: Length along x: a_i in a standard table, a_{i-1} in a modified table.
+        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified table.
         d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
         theta: Rotation about the joint's axis; the joint's value is added for a revolute joint.
         kind: Revolute, continuous or prismatic.
@@ -426,7 +426,7 @@ class DHTable(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the table's coordinates to its joints' values.
+        """The map from the table's coordinates to the values of the table's joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names

@@ -119,7 +119,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Compile a file and run its test vectors, in double and in single precision.
+    """Compile a file and run the file's test vectors, in double and in single precision.
 
     Without a GPU, only the CPU functions of a CUDA file are checked.
     """

@@ -32,7 +32,7 @@ class FrameCode:
 
     `identifiers` contains the names that the exported code uses. The keys "q", "v" and "a" have a name for
     each number of the input. The key "s" has a name for each joint of the path. `maybe_proof` is None for
-    code that urdfkin compiles for its own use. `exact` returns this code with fractions as constants.
+    code that urdfkin compiles for its own use. `exact` returns this code with exact constants.
     """
 
     name: str

@@ -57,7 +57,7 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """Expressions with exact constants; `pi_multiples` maps each replaced angle to its multiple of pi."""
+    """Expressions with exact constants; `pi_multiples` maps a replaced angle to the multiple of pi."""
 
     zero = 0
 
@@ -71,7 +71,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Return a constant angle, as `PiMultiple` if it is a multiple of pi/12."""
+        """Return a constant angle; a multiple of pi/12 becomes a `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 

@@ -44,7 +44,7 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 
 
 def function_prefix(robot: str, frame: str) -> str:
-    """Return the prefix of the exported functions of a frame; it begins with a letter.
+    """Return the prefix of the exported functions of a frame; the prefix begins with a letter.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')

@@ -32,7 +32,8 @@ class Dialect:
         values: Body of the exported function `_values`. This function returns the results of another function
             for several configurations.
         index: Pattern for one number of an input, such as `q[0]`.
-        check_parameter: Parameter of the exported function `check`, with its default; "" for none.
+        check_parameter: Parameter of the exported function `check`, with the parameter's default; "" for
+            none.
     """
 
     about: str

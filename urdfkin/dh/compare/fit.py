@@ -1,9 +1,10 @@
-"""Fit a reference table to the URDF: first the table's free parameters, then as few cells as possible.
+"""Fit a reference table to the URDF.
 
-The free parameters are base, tool and joint offsets. The tip's error at each sampled configuration is a
-twist. The tip's motion due to a small change of a parameter or a cell is a twist too. The fit uses least
-squares to find changes whose twists cancel the error. Often, changes of different cells cancel the same
-error. Then the fit repeats the least squares with new weights, so that as few cells as possible change.
+The first fit changes the free parameters: base, tool and joint offsets. The second fit also changes cells,
+but as few cells as possible. The tip's error at each sampled configuration is a twist. The tip's motion due
+to a small change of a parameter or a cell is a twist too. The fit uses least squares to find changes whose
+twists cancel the error. Often, changes of different cells cancel the same error. Therefore, the fit repeats
+the least squares with new weights, so that as few cells as possible change.
 
 Suppose that the axes of two joints nearly coincide. If an angle is added to one joint offset and subtracted
 from the other joint offset, the tip hardly moves. Therefore, a fit changes these two joint offsets slowly.

@@ -41,7 +41,7 @@ _DIFFERENCE_COST = 0.1
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `find_better_interpretation` ignores these keys of a table, because it fits base and tool.
+#: `find_better_interpretation` ignores these keys of a table, because the function fits base and tool.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
@@ -119,7 +119,7 @@ def find_better_interpretation(
 def find_dh_convention(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Return the convention with which a table fits a path better.
+    """Return the convention, standard or modified, with which a table fits a path better.
 
     Raise InputError if both conventions fit equally well. If neither convention fits, other units and other
     column names are tried before InputError is raised.

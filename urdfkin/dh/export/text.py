@@ -115,7 +115,7 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
 
 
 def format_bound(value: float) -> str:
-    """Format a bound with three digits, rounded up so that it remains a bound.
+    """Format an upper bound with three digits; the last digit is rounded up.
 
     >>> format_bound(7.5912e-06), format_bound(0.0)
     ('7.60e-06', '0')
