@@ -1,20 +1,21 @@
-"""Compute the transform between two consecutive joint axes, along their common normal if it is unique.
+"""Compute the transform between two consecutive joint axes.
 
-The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
-this joint's frame. `find_axis_transform` writes A as a product:
+Usually, the transform is along the common normal of the axes. The z axis of each joint frame is the joint's
+axis. Let A be the constant pose of the next joint's frame in this joint's frame. `find_axis_transform` writes
+A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
-motion of the first joint, so they are part of the first joint's row. In the same way, the factors
-Rz(phi_next) and Tz(delta_next) are part of the second joint's row. For skew axes, beta is 0, and the other
-six numbers are unique except for the direction of x (Denavit and Hartenberg). docs/dh.md explains the numbers
-for parallel and for nearly parallel axes.
+The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. These factors commute
+with the motion of the first joint. Therefore, the first joint's row contains phi and delta. In the same way,
+the second joint's row contains phi_next and delta_next. For skew axes, beta is 0. The other six numbers of
+the product are then unique, except that x can have the opposite direction (Denavit and Hartenberg).
+docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
-The pose of the tip determines only the sum of the offsets d along parallel axes. For coinciding axes, the
-pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta from a reference
-table, except for one row. The d or the theta of this row is chosen so that the sum is correct for the path.
-In a Hayati row, d can also be chosen freely, because the two axes do not determine d.
+For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
+pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
+a reference table, except for one row. In this row, d or theta is computed so that the sum agrees with the
+path. In a Hayati row, any d is possible, because the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -200,12 +201,12 @@ class PairWithReference:
 
     @property
     def normal_offset(self) -> float:
-        """Distance (m) along the first axis from its joint's frame to the common normal."""
+        """Distance (m) along the first axis from the first joint's frame to the common normal."""
         return find_axis_transform(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
-        """Distance (m) along the first axis from the joint's frame to the x axis of a Hayati row.
+        """Distance (m) along the first axis from the first joint's frame to the x axis of a Hayati row.
 
         The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
         Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
@@ -230,8 +231,8 @@ class PairWithReference:
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
         """Return the transform between the two axes.
 
-        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
-        offset for the row (m). `d` is ignored if the two axes determine the offset.
+        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` (m) is
+        the requested offset of the row. If the two axes determine the offset, `d` is ignored.
         """
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
@@ -244,9 +245,10 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, delta_next: float) -> float:
-        """Return the offset (m) along the first axis from the DH frame to the joint's frame, for d = 0.
+        """Return the offset `delta_in` (m) for which d of the first joint's row is 0.
 
-        `delta_next` is the offset (m) along the second axis from the next DH frame to the next joint's frame.
+        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `delta_next`
+        is the offset (m) along the second axis from the next DH frame to the next joint's frame.
         """
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
@@ -254,13 +256,14 @@ class PairWithReference:
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return the transform of each pair of axes, and theta of the row of the pair's first joint.
+    """Return a transform for each pair of axes, and a cell theta for each pair.
 
-    The free choices are made so that the cells are close to the cells of the reference table. `phi_in` is the
-    angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m)
-    along the first axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH
-    frame to the joint's frame. With this offset, d of the last row equals the reference. If `tip_offset` is
-    None, d of the last row may differ from the reference.
+    The cell theta belongs to the row of the pair's first joint. The free choices are made so that the cells
+    are close to the cells of the reference table. `phi_in` is the angle (rad) about the first axis from frame
+    0 to the first joint's frame. `delta_in` is the offset (m) along the first axis between these frames.
+    `tip_offset` is the offset (m) along the last axis from the DH frame to the joint's frame. With this
+    offset, d of the last row equals d of the reference table's last row. If `tip_offset` is None, the two
+    values of d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -281,9 +284,11 @@ def match_axis_transforms(
 def _choose_offset(
     pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None
 ) -> float:
-    """Return d for row i: the reference's d, or a d that makes another cell equal to the reference's cell.
+    """Return the cell d of row i.
 
-    The other cell is the cell d of a later row, or the cell a of a Hayati row.
+    Usually, the result is d of the reference table's row i. In row 0 and in the row of a prismatic joint, d
+    can instead make a different cell equal to the reference table's cell. This different cell is d of a later
+    row, or a of a Hayati row.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -313,7 +318,11 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return the phi that gives row i, or the prismatic rows after row i, the reference's theta."""
+    """Return a free angle phi of row i for which theta of a row equals the reference table's theta.
+
+    Usually, this row is row i. If rows of prismatic joints follow, theta of these rows can be matched
+    instead.
+    """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -389,8 +398,8 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     """Return the tolerance for rounding errors in a constant pose.
 
     The constant pose is a product of joint origin transforms. `joints` is the number of these transforms.
-    `length` is the sum of the lengths of their offsets (m), and `reach` is the length of the whole path (m).
-    The tolerance covers angles that a program rounded to fifteen digits.
+    `length` (m) is the sum of the lengths of the transforms' translations. `reach` (m) is the length of the
+    whole path. The tolerance covers angles that a program rounded to fifteen digits.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)

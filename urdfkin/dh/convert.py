@@ -87,7 +87,7 @@ def to_urdf(table: DHTable) -> str:
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Return the table's tree without limits and mimic rules.
+    """Convert a table to a kinematic tree without joint limits and mimic rules.
 
     The tree has one coordinate for each row, in row order.
     """

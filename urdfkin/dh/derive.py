@@ -56,7 +56,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class DerivationOptions:
-    """The options of a derivation; `urdfkin.dh.make.make_dh_table` explains them."""
+    """Options for the derivation of a table; `urdfkin.dh.make.make_dh_table` explains each option."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -81,9 +81,9 @@ class DerivationOptions:
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
     """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
-    `like` is a standard table of the same joints. The result has the directions of x of `like`, and the
-    offsets of `like` along parallel axes. With `like`, `options.sign` has no effect, and
-    `options.parallel_offset` has an effect only if it is "first".
+    `like` is a standard table of the same joints. The result copies from `like` the directions of the x axes,
+    and the offsets d along parallel axes. With `like`, `options.sign` has no effect. With `like`, the value
+    "first" is the only value of `options.parallel_offset` that has an effect.
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -190,7 +190,10 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the axis of joint k so that its common normal with a nearly parallel axis is near the robot."""
+    """Shift the axis of prismatic joint k to the origin of a neighbouring joint with a nearly parallel axis.
+
+    Without the shift, the common normal of the two axes may be far away from the robot.
+    """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -222,7 +225,8 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # x is e - (e . z) z for the base's x axis e. This form has no cancellation if z is close to e.
+    # The projection of the base's x axis e is x = e - (e . z) z.
+    # The expression below equals x, and has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
@@ -252,7 +256,8 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", `_sum_offsets_in_first_row` later adds the offsets along parallel axes.
+    # With the option "first", each row contains its own offset here.
+    # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -293,7 +298,7 @@ def _match_first_row(
 ) -> tuple[FloatArray, tuple[float, float]]:
     """Copy theta of the first row from `like`, and change the base to compensate.
 
-    If d is 0 in the first row of `like`, d of the first row becomes 0 too.
+    If the first row of `like` has d = 0, the base also compensates for d, and the result has d = 0.
     """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
@@ -308,8 +313,9 @@ def _match_last_row(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Copy theta, a and alpha of the last row from `like`, and change the tool to compensate.
 
-    If d is 0 in the last row of `like`, d of the last row becomes 0 too. If neither table has a tool and the
-    two angles theta are nearly equal, only the rounding errors of theta are removed.
+    If the last row of `like` has d = 0, the tool also compensates for d, and the result has d = 0. Nothing is
+    copied if neither table has a tool and the two angles theta are nearly equal. Then only a rounding error
+    of theta is removed.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)

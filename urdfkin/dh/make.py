@@ -29,7 +29,7 @@ _MAX_DIFFERENCE = 0.1
 _ZERO_TOLERANCE = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
-#: Options that the published table of `like` determines.
+#: These options follow from the published table if the argument `like` is given.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
@@ -45,7 +45,7 @@ def derive_matching_table(chain: FrameChain, options: DerivationOptions, referen
 def find_reversed_joints(
     chain: FrameChain, options: DerivationOptions, reference: DHTable
 ) -> tuple[str, ...]:
-    """Return the joints whose positive direction in the reference is opposite to the URDF's."""
+    """Return the joints with opposite positive directions in the reference table and in the URDF."""
     check_joints(chain, reference)
     standard = to_convention(reference, "standard")
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
@@ -73,7 +73,7 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference from a reference; the smallest key is best."""
+    """Return a key for sorting tables: the closest table to the reference table has the smallest key."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
@@ -128,31 +128,30 @@ def make_dh_table(
             no angle is changed.
         last: "tip": the last row ends at the tip if four parameters suffice for this. "flange": the tool
             contains the transform from the last axis to the tip.
-        parallel_offset: Rule for the rows of consecutive parallel axes. "last" or "first": the last or the
-            first of these rows contains the sum of the offsets along the axes. "each": every row contains
-            the offset of its own link.
-        flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
+        parallel_offset: Rule for the offsets d along consecutive parallel axes. "last": the last row of these
+            axes contains the sum of the offsets. "first": the first row of these axes contains the sum.
+            "each": every row contains the offset of its own link.
+        flip: Names of joints whose positive direction is reversed. In the rows of these joints, `sense` is
+            -1.
         first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
             axis. "joint": the base contains the transform to the first axis, and d_1 and theta_1 are zero
             (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
-        slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
-            direction. "drawn": the axis passes through the joint's origin in the URDF. The axis is shifted if
-            the shift avoids a translation of the base, a tool, or a distant common normal. "minimal": the
-            axis passes through the origin of the next joint if the next joint is revolute. Otherwise, the
-            axis passes through the origin of the previous joint if the previous joint is revolute. The length
-            a between the two axes is then 0.
-        like: A published table. The result has the published table's positive joint directions and
-            directions of x. The result also has the published offsets along parallel axes, and the published
-            zero positions of the first and the last joint. All other numbers come from the URDF.
-            The arguments `last`, `parallel_offset`, `flip`, `first` and `sign` must then have their default
-            values.
+        slide: Rule for the position of a prismatic joint's axis, because a prismatic joint defines only the
+            direction of its axis. "drawn": the axis passes through the joint's origin in the URDF. This axis
+            is shifted if the shift avoids a tool, a translation of the base or a distant common normal.
+            "minimal": the axis passes through the origin of a neighbouring revolute joint, so that the cell a
+            between these two axes is 0. The previous joint is used only if the next joint is not revolute.
+        like: A published table. The result copies the positive joint directions and the directions of the x
+            axes from this table. The result also copies the offsets d along parallel axes, and the zero
+            positions of the first and the last joint. All other numbers come from the URDF. With `like`, the
+            arguments `last`, `parallel_offset`, `flip`, `first` and `sign` must have their default values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option has an invalid value, an option excludes `like`, or the path contains a planar
-            or floating joint.
+        InputError: an option has an invalid value, `like` is combined with an option that must have its
+            default value, or the path contains a planar or floating joint.
         RangeError: the square of a length is outside the range of doubles.
     """
     exact = make_chain(tree, tip, base)

@@ -76,7 +76,8 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             break
     else:
         raise _missing_header_error(lines)
-    # If a robot has the name "robot", its title begins with "robot:" and looks like a setting.
+    # For a robot with the name "robot", the table's title begins with "robot:".
+    # This title is not a setting, although a setting has the same form, for example "convention: modified".
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
     if "convention" not in data and (convention := _find_convention(grid)):
@@ -230,7 +231,7 @@ def _parse_aligned(lines: list[str]) -> _Grid | None:
 
 
 def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Parse a line of headings; return None unless a, alpha, d and theta all occur."""
+    """Parse a line of headings; return None if a, alpha, d or theta is missing."""
     columns = tuple(map(_parse_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in COLUMNS):
@@ -273,10 +274,10 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """Return the convention that the headings show, or else the convention that the text names.
+    """Find the convention of a table in the headings or in the text around the table.
 
-    Headings with the index i-1 show the modified convention. Without such headings, return None if the text
-    around the table names no convention, or both.
+    Headings with the index i-1 show the modified convention. Otherwise, the text around the table may name
+    the convention. Return None if the text names no convention, or both conventions.
     """
     if any(column.previous for column in grid.columns):
         return "modified"

@@ -206,7 +206,10 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" by its constant, which is pi; add the keys `kind` and `sense`."""
+    """Replace the cell with the joint's variable by the constant in the cell.
+
+    For example, the cell "q3 + pi" becomes the number pi. The result also has the keys `kind` and `sense`.
+    """
     texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
     cells = {name: _parse_cell_text(text, f"{where}, {name}") for name, text in texts.items()}
     variables = [name for name, cell in cells.items() if cell.factor is not None]
@@ -407,7 +410,10 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping with the keys of a TOML file (`urdfkin.dh.rows` shows them)."""
+    """Make a table from a mapping that has the keys of a TOML file.
+
+    The docstring of the module `urdfkin.dh.rows` shows the keys.
+    """
     if "convention" not in data:
         raise InputError(
             "the table does not name its convention",

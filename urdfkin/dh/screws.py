@@ -43,7 +43,8 @@ from urdfkin.model.tree import (
 )
 
 #: Tolerance of handwritten screws and of M.
-#: The length of an axis may differ from 1 by this number, and the pitch (m/rad) from 0.
+#: The length of an axis vector may differ from 1 by this number.
+#: The pitch (m/rad) of a screw may differ from 0 by this number.
 #: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
@@ -59,7 +60,7 @@ class ScrewJoint:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProductOfExponentials(Displayable):
-    """A robot's path as a product of exponentials; `print` and notebooks show it as tables.
+    """A robot's path as a product of exponentials; `print` and notebooks show the product as tables.
 
     Attributes:
         joints: The joints, base to tip.
@@ -105,7 +106,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the path's coordinates to its joints' values.
+        """The map from the path's coordinates to the values of the path's joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names
@@ -278,10 +279,11 @@ def screws_from_rows(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics, with
-    a column for each joint, is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the tip in the
-    zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
-    screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
+    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics has a
+    column for each joint. The shape (6, n) is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the
+    tip in the zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body"
+    (the tip). A screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a
+    pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S

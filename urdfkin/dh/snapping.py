@@ -1,7 +1,7 @@
 """Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
-To snap an angle is to replace it by the nearest multiple of 15 degrees, if their difference is at most a
-tolerance. Three kinds of angles are snapped:
+To snap an angle means to replace the angle by the nearest multiple of 15 degrees. An angle is snapped only if
+it differs from this multiple by at most a tolerance. Three kinds of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations about these axes;
@@ -184,7 +184,10 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Multiply rotations about coordinate axes, with each angle snapped within `tolerance`."""
+    """Snap the angles of rotations about coordinate axes, and multiply the rotations.
+
+    `tolerance` (rad) is the largest change of an angle.
+    """
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)

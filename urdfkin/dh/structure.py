@@ -1,4 +1,4 @@
-"""Find the structure of an arm, and export it for closed-form inverse kinematics solvers.
+"""Find the structure of an arm, and export the structure for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
 point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
@@ -39,7 +39,8 @@ from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 #: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
-#: Smaller singular values count as zero; rounding errors are far below this number.
+#: Singular values below this number count as zero.
+#: Rounding errors of singular values are far below this number.
 _RANK_TOLERANCE = 1e-6
 _REACH_SAMPLES = 2000
 #: Default tolerance of `find_opw` (metres and rad).
@@ -160,7 +161,7 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and its distance (m) from the farthest axis."""
+    """Return the least-squares intersection of axes, and the distance (m) from there to the farthest axis."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -243,7 +244,7 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
 
 
 def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
-    """Return the point from which the reach is measured, in the base frame (m), and its description."""
+    """Return the point (m, base frame) from which the reach is measured, and a text that names the point."""
     if not screws.joints or not screws.joints[0].kind.turns:
         return np.zeros(3), "the base's origin"
     if len(screws.joints) > 1 and screws.joints[1].kind.turns:
@@ -277,7 +278,10 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
+    """Return the tip's positions at random joint values, and the Jacobian at the first of these samples.
+
+    Mimic rules are ignored, so every joint moves independently.
+    """
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]

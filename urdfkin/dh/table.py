@@ -62,8 +62,8 @@ class DHRow:
     """One row of a table: the constant parts of one joint's parameters, in metres and radians.
 
     Attributes:
-        a: Length along x: a_i in a standard table, a_{i-1} in a modified one.
-        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified one.
+        a: Length along x: a_i in a standard table, a_{i-1} in a modified table.
+        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified table.
         d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
         theta: Rotation about the joint's axis; the joint's value is added for a revolute joint.
         kind: Revolute, continuous or prismatic.
@@ -239,12 +239,14 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """One angle that was rounded to a multiple of 15 degrees; the rounding rotates the rest of the chain.
+    """The change of one angle that was rounded to a multiple of 15 degrees.
+
+    The change rotates the rest of the chain about a point.
 
     Attributes:
         row: Index of the changed row, from 0. The index -1 means the base, and the index n means the tool of
             a table with n rows.
-        angle: Angle (rad) of this rotation.
+        angle: Angle (rad) by which the rest of the chain rotates.
         lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
             zero.
         prismatic_joints: Prismatic joints between the rotation's centre and the tip. The travel of these
@@ -424,7 +426,7 @@ class DHTable(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the table's coordinates to its joints' values.
+        """The map from the table's coordinates to the values of the table's joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names
@@ -535,7 +537,7 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The path from the base to frame n, with a motion and a constant pose for each row."""
+        """The path from the base to frame n; each row gives one motion and one constant pose."""
         steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
             motion = ElementaryMotion(2, row.kind.turns)

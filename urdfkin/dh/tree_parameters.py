@@ -7,11 +7,11 @@ frame i:
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
-The axis x_i is along the common normal between the axes of link i and of its first moving child. Therefore,
-gamma and b of this child are zero. For a chain without branches, the table equals the modified
-Denavit-Hartenberg table; d is then a(i-1), and r is d(i). The angle beta is not part of the original
-notation. The angle beta is zero unless two axes are nearly parallel. Without beta, nearly parallel axes may
-need offsets of kilometres (Hayati).
+The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
+child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table equals
+the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified table, and the
+parameter r is called d(i). The angle beta is not part of the original notation. The angle beta is zero unless
+two axes are nearly parallel. Without beta, nearly parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -48,9 +48,11 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 
 @dataclass(frozen=True, slots=True)
 class TreeRow:
-    """One joint and its child link, in metres and radians; the module's equation defines the cells.
+    """The row of one joint and its child link, in metres and radians.
 
-    The joint's value is added to theta if sigma is 0, and to r if sigma is 1.
+    The cells gamma, b, d, alpha, beta, theta and r define the pose of the link's frame in the antecedent's
+    frame. This pose is Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r). The joint's value is added
+    to theta if sigma is 0, and to r if sigma is 1.
 
     Attributes:
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
@@ -191,9 +193,9 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 class _LinkAxis:
     """The axis frame of a link, with z along the axis of the link's joint.
 
-    `T_antecedent_axis` is the pose in the antecedent's axis frame. `T_link_axis` is the pose in the link's
-    URDF frame. Small tilts on the path from the root to the link are set to zero. `zeroed_tilt` is the sum
-    (rad) of these tilts.
+    `T_antecedent_axis` is the pose of this axis frame in the antecedent's axis frame. `T_link_axis` is the
+    pose of this axis frame in the link's URDF frame. Small tilts on the path from the root to the link are
+    set to zero. `zeroed_tilt` is the sum (rad) of these tilts.
     """
 
     antecedent: int
@@ -206,7 +208,8 @@ class _LinkAxis:
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
     links = list[_LinkAxis]()
-    # Each link has its antecedent, T_antecedent_link, and the number of fixed joints between the two links.
+    # The list has an entry for each link: (index of the antecedent, T_antecedent_link, number of joints).
+    # The number counts the fixed joints between the antecedent and the link.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]

@@ -30,9 +30,11 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code itself, or the code with exact constants if the language is sympy-exact.
+    """Return the code that a file in the language `to` contains.
 
-    Raise VerificationError if Pinocchio's results differ from those of the exact expressions.
+    For the language sympy-exact, the result is the code with exact constants. For all other languages, the
+    result is `code`. Raise VerificationError if the results of the exact expressions differ from Pinocchio's
+    results.
     """
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 

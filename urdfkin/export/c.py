@@ -152,7 +152,8 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """The order of the numbers in the array `in` of the C code.
 
-    Inputs that are not angles come first. Inputs that are angles, computed angles, sines and cosines follow.
+    The array contains, in this order: inputs that are not angles, inputs that are angles, computed angles,
+    sines, cosines.
     """
 
     def __init__(self, function: Function) -> None:

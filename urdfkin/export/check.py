@@ -1,7 +1,8 @@
 """Check the seal of an exported file, compile or import the file, and run the file's test vectors.
 
-The seal is the digest of the text, in the file's header. The seal shows whether the header, the code or the
-test vectors of the file were changed. A seal is not a signature, so it does not prove who wrote the file.
+The seal is a line in the header of an exported file. This line contains the digest of the file's text. The
+seal shows whether the header, the code or the test vectors of the file were changed. A seal is not a
+signature, so it does not prove who wrote the file.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
 that person's programs. The check runs a copy of the file in a separate folder. In the original folder, the
@@ -118,7 +119,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Compile a file and run its test vectors, in double and in single precision.
+    """Compile a file and run the file's test vectors, in double and in single precision.
 
     Without a GPU, only the CPU functions of a CUDA file are checked.
     """

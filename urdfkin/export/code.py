@@ -30,9 +30,9 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame. No name contains characters that end a comment in the exported file.
 
-    `identifiers` contains identifiers for the entries of "q", "v" and "a", and for the path's joints ("s").
-    `maybe_proof` is None for code that urdfkin compiles for its own use. `exact` returns this code with
-    fractions as constants.
+    `identifiers` contains the names that the exported code uses. The keys "q", "v" and "a" have a name for
+    each number of the input. The key "s" has a name for each joint of the path. `maybe_proof` is None for
+    code that urdfkin compiles for its own use. `exact` returns this code with exact constants.
     """
 
     name: str
@@ -104,9 +104,9 @@ def make_verified_code(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Return a frame's code with test vectors; the code's results were compared with Pinocchio's results.
+    """Make the functions of a frame, and test vectors for the functions.
 
-    There is no comparison if verification is switched off.
+    The results of the functions are compared with Pinocchio's results, unless verification is switched off.
     """
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])

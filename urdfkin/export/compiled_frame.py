@@ -142,7 +142,8 @@ def _load_code(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path, and a later library can get the same descriptor.
+        # The loader identifies a library by the library's path, which contains the file descriptor.
+        # After the file is closed, a later library can get the same file descriptor.
         # A different number of "./" for each library makes all paths different.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
@@ -386,7 +387,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # For an input that is not finite, the code below raises an error with the input's position.
+            # If a number is not finite, the code below checks the inputs again.
+            # The error message of the code below names the number's coordinate.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])

@@ -1,7 +1,8 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are the URDF's decimals as fractions. If an angle and a multiple of pi/12 have the same nearest
-double, the multiple replaces the angle: 1.5707963267948966 becomes pi/2. Irrational square roots, sines and
+The constants are the URDF's decimals as fractions. An angle that equals a multiple of pi/12 in double
+precision is replaced by this multiple. For example, 1.5707963267948966 becomes pi/2. Rational square roots
+become fractions. Sines and cosines of multiples of pi/2 become integers. All other square roots, sines and
 cosines remain expressions.
 """
 
@@ -34,7 +35,7 @@ from urdfkin.verify.exact.numbers import (
 )
 from urdfkin.verify.verifier import Verifier
 
-#: Largest angle (rad) that may become a multiple of pi/12.
+#: Larger angles (rad) are never replaced by multiples of pi/12.
 #: Up to this angle, the distance between neighbouring doubles is far smaller than pi/12.
 _MAX_ANGLE = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
@@ -56,7 +57,7 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """Expressions with exact constants; `pi_multiples` maps each replaced angle to its multiple of pi."""
+    """Expressions with exact constants; `pi_multiples` maps a replaced angle to the multiple of pi."""
 
     zero = 0
 
@@ -70,7 +71,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Return a constant angle, as `PiMultiple` if it is a multiple of pi/12."""
+        """Return a constant angle; a multiple of pi/12 becomes a `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
@@ -165,7 +166,7 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks of an exported file with exact constants.
+    """The checks of an exported file whose constants are exact.
 
     `angle_count` is the number of different angles that were replaced by multiples of pi.
     `max_angle_change` is the largest difference (rad) between an angle and the multiple of pi that replaces
@@ -197,7 +198,7 @@ def make_exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Make functions with exact constants, and compare the functions with Pinocchio.
 
-    Return the functions, and a proof with the test vectors of `proof`.
+    The returned proof has the same test vectors as the argument `proof`.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):

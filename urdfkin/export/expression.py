@@ -1,10 +1,10 @@
 """Symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each expression at its creation. Constants are Python floats, so an operation on
-constants gives a float, not a node. Products with 0 and 1 and sums with 0 are removed. A product (-x) y
-becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same node, so the
-sine and the cosine of each joint occur once.
+The graph simplifies each new expression. Constants are Python floats, so an operation on constants gives a
+float, not a node. Products with 0 and 1 and sums with 0 are removed. A product (-x) y becomes -(x y), and a
+sum x + (-y) becomes the difference x - y. Equal expressions are the same node, so the sine and the cosine of
+each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.make_input("q", 0), graph.make_input("q", 1)
@@ -32,7 +32,8 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        operands: The operands, which are nodes and constants; for an input such as q[3], the index 3.
+        operands: The operands of an operation: nodes and constants. For an input, the index; for example, 3
+            for the input q[3].
         index: Number of the expression in the order of creation; operands have smaller numbers.
         step: Index of the recursion's step that created this expression. The first steps are the joints of
             the path; the last steps are the final frame and the results.
@@ -77,7 +78,7 @@ class Node:
 
 
 class Graph:
-    """The expressions of one function; each node stores the number of the equation that created it."""
+    """The expressions of one function; each node stores the number of the equation that created the node."""
 
     #: The number 0. Each product with 0 and each difference x - x becomes this constant.
     zero: float = 0.0
@@ -140,7 +141,7 @@ class Graph:
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that calls an equation, and stores the equation's number in each new node.
 
-        If one equation calls another equation, the nodes store the number of the calling equation.
+        If an equation calls a second equation, all new nodes store the number of the first equation.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -165,7 +166,7 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return y if x is -y, where y is an expression or a positive constant; else None."""
+    """Return the expression y if x is -y. Return -x if x is a negative constant. Otherwise, return None."""
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None

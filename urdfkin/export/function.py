@@ -1,16 +1,16 @@
 """Make a function of the exported code, and bound the rounding errors of the function.
 
-Each function computes one quantity of one frame. The exported code assigns each expression that occurs more
-than once to a variable. Sines, cosines, square roots, quotients and the numbers of a link's state (pose,
-velocity, acceleration) are also assigned to variables. A long expression is split into several assignments.
-All other expressions are parts of larger expressions.
+Each function computes one quantity of one frame. An expression that occurs more than once in the exported
+code is assigned to a variable. Each sine, cosine, square root and quotient is assigned to a variable. Each
+number of a link's pose, velocity and acceleration is assigned to a variable. A long expression is split into
+several assignments. All other expressions are parts of larger expressions.
 
 `single_bounds` bounds the rounding errors of a function in single precision. Each operation and each constant
 of the code has a rounding error, which `urdfkin.kinematics.roundings` derives. To first order in eps, the
-error of a result is a sum of products. One factor of a product is the rounding error of an operation or a
-constant. The other factor is the derivative of the result with respect to the operation or constant. The
-bound is the sum of the absolute values of these products. One backward pass over the operations computes the
-derivatives of all results.
+error of a result is a sum of products. Each operation and each constant gives one product. The first factor
+is the rounding error of this operation or constant. The second factor is the derivative of the result with
+respect to the value of this operation or constant. The bound is the sum of the absolute values of these
+products. One backward pass over the operations computes the derivatives of all results.
 """
 
 from __future__ import annotations

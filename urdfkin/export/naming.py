@@ -1,7 +1,7 @@
-"""Convert names of a URDF to identifiers, and to text for comments, that are valid in every language.
+"""Convert the names in a URDF to identifiers and comments for exported code.
 
-Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
-identifier is a keyword.
+The identifiers and comments are valid in every language. Identifiers are short, ASCII and unique. The
+exported code adds a prefix such as `s_` or `q_`, so that no identifier is a keyword.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 
 
 def function_prefix(robot: str, frame: str) -> str:
-    """Return the prefix of the exported functions of a frame; it begins with a letter.
+    """Return the prefix of the exported functions of a frame; the prefix begins with a letter.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')

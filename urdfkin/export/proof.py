@@ -158,7 +158,7 @@ def compare_with_pinocchio(
 
     Raise VerificationError if a difference exceeds the error bound.
     """
-    # A copy of the verifier makes the checks, so that the user's certificate does not count them.
+    # A copy of the verifier makes the checks, because the user's certificate must not include these checks.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:
@@ -243,7 +243,10 @@ def _round_down(x: float) -> str:
 
 
 def _round_up(x: float) -> str:
-    """Round a bound up, because the error of a constant can be equal to its bound."""
+    """Round a bound up.
+
+    A bound must not become smaller, because the rounding error of a constant can be as large as the bound.
+    """
     return _round(x, 7, ROUND_CEILING)
 
 

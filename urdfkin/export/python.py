@@ -32,7 +32,8 @@ class Dialect:
         values: Body of the exported function `_values`. This function returns the results of another function
             for several configurations.
         index: Pattern for one number of an input, such as `q[0]`.
-        check_parameter: Parameter of the exported function `check`, with its default; "" for none.
+        check_parameter: Parameter of the exported function `check`, with the parameter's default; "" for
+            none.
     """
 
     about: str
@@ -118,7 +119,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
     """Return a function for `Dialect.first_lines`.
 
-    The exported code checks the length of each input of one configuration.
+    The exported code computes one configuration, and checks the number of entries of q, v and a.
     """
 
     def first_lines(writer: Writer) -> list[str]:

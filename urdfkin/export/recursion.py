@@ -3,10 +3,11 @@
 At each joint, the recursion translates along the rigid link and applies a constant rotation. Then the
 recursion applies the motion of the joint about or along z. Placements and Jacobians are computed in the axes
 of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's
-frame, where joint axes are (0, 0, 1) and link vectors are constant. For LOCAL_WORLD_ALIGNED, the rotations of
-the path are then applied to the result, one after another. These rotations need a third fewer operations than
-the computation of the frame's rotation matrix R. For the reference WORLD, velocities and accelerations are
-computed in the axes of the world frame.
+frame, where joint axes are (0, 0, 1) and link vectors are constant. For the reference LOCAL_WORLD_ALIGNED,
+the results are then transformed to the axes of the world frame. All rotations along the path are applied to
+the results one after another. These rotations need a third fewer operations than the computation of the
+frame's rotation matrix R. For the reference WORLD, velocities and accelerations are computed in the axes of
+the world frame.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ _Z: Vector = (0, 0, 1)
 
 @dataclass(frozen=True)
 class NumberKind:
-    """The functions for one type of number, and two functions that the recursion calls at each step.
+    """The functions that the recursion needs for one type of number.
 
-    `chapter` contains the textbook's equations. `begin_step` is called before each joint, before the final
-    frame and before the results. `end_step` is called after each joint and after the final frame. The integer
-    argument of `begin_step` and `end_step` is the index of the step. The first joint has the index 0.
+    `chapter` contains the textbook's equations. The recursion calls `begin_step` before each joint, before
+    the final frame and before the results. The recursion calls `end_step` after each joint and after the
+    final frame. The integer argument of `begin_step` and `end_step` is the index of the step. The first joint
+    has the index 0.
     """
 
     chapter: Any
@@ -42,9 +44,9 @@ class NumberKind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path; `end` is the state of the frame.
 
-    The motion of each link is computed in the axes of the link's frame if `own_axes` is True, and otherwise
-    in the axes of the world frame. An input that is not needed consists of zeros. `turns` are rotation
-    matrices from the axes of each frame to the axes of the previous frame.
+    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. If `own_axes`
+    is False, the motion is computed in the axes of the world frame. An input that is not needed consists of
+    zeros. `turns` are rotation matrices from the axes of each frame to the axes of the previous frame.
     """
 
     def __init__(

@@ -41,12 +41,13 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported only if their correction reduces the tip error to at most this fraction.
-#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach also suffices.
+#: A comparison reports the differing cells only if a correction of these cells reduces the tip error.
+#: The remaining tip error must be at most this fraction of the tip error without the correction.
+#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _CORRECTED_FRACTION = 0.5
-#: This fraction applies to a table that does not agree with the URDF.
-#: A mistake is reported only if its correction reduces the tip error to at most this fraction.
-#: A remaining tip error within the tolerance also suffices.
+#: If a table does not agree with the URDF, the search for a mistake in the table uses this number.
+#: The search accepts a correction that reduces the tip error to at most this fraction.
+#: The search also accepts a correction with a remaining tip error within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Suppose that n cells differ without a fit, and m cells differ after a fit.
@@ -68,9 +69,9 @@ def compare(
 ) -> TableComparison:
     """Compare a reference table with a path of a URDF; `tolerance` is the tolerance at the tip (metres).
 
-    The table's base and tip frames may differ from the path's frames. The table's frames must then be fixed
-    to the path's base link and tip link. If `fit` is true, base, tool, joint offsets and joint signs are
-    fitted before the comparison.
+    The table may have other base and tip frames than the path. The table's base frame must be fixed to the
+    path's base link, and the table's tip frame must be fixed to the path's tip link. If `fit` is true, base,
+    tool, joint offsets and joint signs are fitted before the comparison.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -135,10 +136,11 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach (metres). Angles are multiplied by it to compare them with lengths.
+    """Return the robot's reach (metres).
 
-    A table without Hayati rows may have offsets of kilometres. The path length of a URDF that was made from
-    this table is then far larger than the reach.
+    A comparison multiplies angles by the reach, so that angles and lengths are comparable. The path length of
+    a URDF can be far larger than the reach. For example, a URDF made from a table without Hayati rows may
+    contain offsets of kilometres.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -163,7 +165,10 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the tip's poses on samples for a fit, and on other samples that check the fit."""
+    """Return the tip's poses for a fit, and the tip's poses for a check of the fit.
+
+    The two sets of poses have different random joint values.
+    """
     values, poses = _sample_poses(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(
@@ -172,7 +177,10 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return random joint values (count, n) and the tip's poses, without mimic rules."""
+    """Return random joint values (count, n), and the tip's pose for each sample.
+
+    Mimic rules are ignored, so every joint moves independently.
+    """
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
@@ -203,9 +211,10 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of standard row i.
+    """Return the index of the reference row that contains the cell `cell` of row i of the standard table.
 
-    Return None if no row of the reference contains the cell.
+    In a modified table, row i + 1 contains the cells a, alpha and beta of row i of the standard table. Return
+    None if the modified table has no row i + 1.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
@@ -247,7 +256,10 @@ def _find_differences(
     half_digits: HalfDigits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ by more than rounding, the largest effect on the tip first."""
+    """Return the cells that differ by more than rounding errors.
+
+    The cells are in descending order of their effect on the tip.
+    """
     by_cells, scale = tip_derivatives(fitted, check_targets)[2], check_targets.scale
     linear = by_cells.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
     largest = np.linalg.norm(linear, axis=1).max(axis=0)
@@ -281,9 +293,9 @@ def _find_differences_without_fit(
     check_targets: TargetPoses,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ without a fit.
+    """Return the cells that must change so that the unfitted table agrees with the URDF.
 
-    The result is empty if a tip error remains after a correction of these cells.
+    The result is empty if a tip error remains after these changes.
     """
     corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
@@ -306,8 +318,9 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
     """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
-    The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
-    limits, or within `ASSUMED_LIMIT` of zero if `has_range` is false.
+    The bound does not include rounding errors. The bound ignores mimic rules. The bound assumes that a
+    prismatic joint is within its limits. If `has_range` is false for these limits, the bound assumes a joint
+    value within `ASSUMED_LIMIT` of zero.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -318,7 +331,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Return a path as a tree without mimic rules, with the link names of the table."""
+    """Convert a path to a tree without mimic rules; the tree's links have the names of the table's links."""
     travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:

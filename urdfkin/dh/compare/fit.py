@@ -1,9 +1,10 @@
-"""Fit a reference table to the URDF: first the table's free parameters, then as few cells as possible.
+"""Fit a reference table to the URDF.
 
-The free parameters are base, tool and joint offsets. The tip's error at each sampled configuration is a
-twist. A small change of a number in the table moves the tip by another twist. Least squares find the changes
-whose twists remove the error. If changes of different cells can remove the same error, reweighted least
-squares change as few cells as possible.
+The first fit changes the free parameters: base, tool and joint offsets. The second fit also changes cells,
+but as few cells as possible. The tip's error at each sampled configuration is a twist. The tip's motion due
+to a small change of a parameter or a cell is a twist too. The fit uses least squares to find changes whose
+twists cancel the error. Often, changes of different cells cancel the same error. Therefore, the fit repeats
+the least squares with new weights, so that as few cells as possible change.
 
 Suppose that the axes of two joints nearly coincide. If an angle is added to one joint offset and subtracted
 from the other joint offset, the tip hardly moves. Therefore, a fit changes these two joint offsets slowly.
@@ -61,9 +62,9 @@ _PATIENCE = 4
 _ROUNDING = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _TIP_ROUNDING = 1e-12
-#: A fit with other joint signs must reduce the smallest tip error so far to less than this fraction.
+#: Other joint signs are accepted only if the tip error falls below this fraction of the best tip error.
 _OTHER_START_ERROR = 0.5
-#: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
+#: Angles (rad) by which the offsets of two consecutive joints change in opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
@@ -303,8 +304,8 @@ def fit_model(
     if best_size <= EPS * fit_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
-        # Least squares minimize the sum over all samples, but models are compared by their worst sample.
-        # Therefore, the model before the fit may be better than the fitted model.
+        # A fit minimizes the sum of the squared errors of all samples, but `size` is the largest error.
+        # Therefore, `size` may be smaller before the fit than after the fit.
         model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=size)
         model_size = size(model)
         if model_size < (1.0 if i == 0 else _OTHER_START_ERROR) * best_size:
@@ -382,7 +383,10 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return models with an angle added to one joint offset and subtracted from the next joint offset."""
+    """Return models in which the offsets of two consecutive revolute joints have changed by a large angle.
+
+    The two rotations cancel each other if the axes of the joints coincide.
+    """
     models = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, CELLS.index("alpha")])))

@@ -2,9 +2,9 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations. An interpretation ranks higher if its shape is closer
-to the URDF's shape, and lower if it differs more from the file's interpretation. The function fits at most
-three interpretations.
+`find_better_interpretation` ranks the interpretations by a sum of two terms. The first term is the difference
+between the table's shape and the URDF's shape. The second term is a cost for each difference from the
+interpretation that the file states. The function fits at most the three best interpretations.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each difference from the file's interpretation has the same cost.
-#: The cost is the tolerance, plus this fraction of the smallest shape difference from the URDF.
+#: Each difference from the interpretation that the file states has the same cost.
+#: The cost is a sum: the tolerance, plus this fraction of the smallest difference from the URDF's shape.
 _DIFFERENCE_COST = 0.1
-#: The tip error of a better interpretation is at most this fraction of the reach.
-#: The tip error is also at most this fraction of the tip error of the file's interpretation.
-#: A tip error within the tolerance is always small enough.
+#: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
+#: A larger tip error must be at most this fraction of the reach.
+#: A larger tip error must also be at most this fraction of the tip error with the stated interpretation.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `find_better_interpretation` ignores these keys of a table, because it fits base and tool.
+#: `find_better_interpretation` ignores these keys of a table, because the function fits base and tool.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
@@ -79,8 +79,9 @@ def find_better_interpretation(
     """Return the interpretation with which a table agrees with a URDF, or None.
 
     `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
-    is the tip error with the interpretation that the file states. The returned interpretation has a tip error
-    of at most `tolerance` (metres), or at most 5 % of `stated_error` and at most 5 % of the reach.
+    is the tip error with the interpretation that the file states. The function accepts an interpretation with
+    a tip error of at most `tolerance` (metres). A larger tip error must be at most 5 % of `stated_error` and
+    at most 5 % of the reach.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -90,7 +91,8 @@ def find_better_interpretation(
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
-        # A variable such as q1 in an exchanged column makes a revolute joint prismatic.
+        # A joint is prismatic if its variable, for example q1, is in the column d.
+        # Therefore, an exchange of columns can change the kind of a joint.
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             continue
         difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())
@@ -117,9 +119,10 @@ def find_better_interpretation(
 def find_dh_convention(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Return the convention with which a table fits a path better.
+    """Return the convention, standard or modified, with which a table fits a path better.
 
-    InputError is raised if both conventions fit equally well, or if neither fits, even in other units.
+    Raise InputError if both conventions fit equally well. If neither convention fits, other units and other
+    column names are tried before InputError is raised.
     """
     comparisons = dict[DHConvention, TableComparison]()
     errors = list[InputError]()
@@ -229,7 +232,10 @@ def parse_interpretation(data: Mapping[str, Any]) -> Interpretation:
 
 
 def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretation, DHTable]]:
-    """Yield every other interpretation in which the table is valid, the most similar first."""
+    """Yield each other interpretation in which the table is valid, and the table in this interpretation.
+
+    An interpretation with fewer differences from the stated interpretation comes earlier.
+    """
     rows = data.get("rows")
     if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return

@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. With the
-correct sign, a fit changes fewer parameters than with the wrong sign, or no parameters.
+A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
+correction of the sign, a fit changes fewer of these parameters. Some corrected tables need no fit.
 """
 
 from __future__ import annotations
@@ -56,12 +56,16 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Correct each possible mistake, fit the corrected table, and return the mistakes with the least fit.
+        """Return the mistakes whose correction requires the smallest fit.
 
-        The least fit changes the fewest parameters. The result is empty if no correction makes the fit
-        smaller. A table that `agrees` after a fit may be correct, and may differ from the URDF only in its
-        frames. A correction of such a table is reported only if the corrected table needs no fit, or only a
-        fit of one end (base or tool).
+        Each possible mistake is corrected in a copy of `reference`, and the copy is fitted to the URDF. The
+        smallest fit changes the fewest parameters: base, tool, joint offsets and joint signs. The result is
+        empty if no corrected table agrees after a fit of fewer parameters than `reference` needs.
+
+        If `agrees` is true, `reference` agrees with the URDF after a fit. Such a table may be correct,
+        because the author of a table can choose the frames. Then a corrected table must agree without a fit,
+        or after a fit of only the base or only the tool. If `fit` is false, a corrected table must agree
+        without a fit.
         """
         if self._without_fit(reference) is not None:
             return ()
@@ -184,7 +188,8 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # For two or three rows, the reversed order is the exchange of the first and the last row.
+    # With two or three rows, a reversal only exchanges the first and the last row.
+    # The loop above already contains this exchange.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

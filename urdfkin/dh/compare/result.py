@@ -22,11 +22,13 @@ Parts = list[str | Table | Matrix]
 
 #: After a correction of cells, a tip error up to this number is treated as zero.
 #: The unit is rad, or metres per metre of reach.
-#: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
+#: The rounding errors of a fit are far below this number.
+#: The rounding errors of numbers in data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
 #: `fit_resolution` replaces a smaller tip error by this number (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
-#: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
+#: Half a unit of a cell's last digit is multiplied by this factor.
+#: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_FACTOR = 1.0 + 1e-6
 
 
@@ -81,7 +83,7 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FitChanges:
-    """The parameters that a fit must change.
+    """The parameters of a table that a fit changes.
 
     `zeros` is the number of joints with a changed offset. `reversed` is the number of joints with a changed
     sign.
@@ -128,20 +130,20 @@ class TableComparison:
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
             offsets. The method `placement` of this table takes the URDF's joint coordinates.
-        travel: Sum of the largest distances (m) of the prismatic joints from zero.
+        travel: Sum (m), over all prismatic joints, of the largest absolute joint value.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
-        metres, radians: Largest errors of the fitted table's tip on the samples.
-        metres_bound, radians_bound: Proven upper bounds of the errors of the fitted table's tip for all
-            angles, and for all displacements within limits. A prismatic joint without limits is assumed to be
-            within 10 m of zero. The bounds do not include rounding errors.
-        unfitted_metres, unfitted_radians: Largest errors of the unfitted table's tip on the samples.
-        unfitted_differences: The cells that must change so that the table agrees without a fit. The tuple is
-            empty for a table with mistakes, and for a comparison without a fit. It is also empty if a tip
-            error remains after a correction of these cells, or if they outnumber the cells in `differences`
-            by more than two.
-        hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
-            offsets.
+        metres, radians: Largest tip error of the fitted table on the samples.
+        metres_bound, radians_bound: Proven upper bounds of the fitted table's tip error. The bounds hold for
+            all angles, and for all displacements within the joint limits. A prismatic joint without limits is
+            assumed to be within 10 m of zero. The bounds do not include rounding errors.
+        unfitted_metres, unfitted_radians: Largest tip error of the unfitted table on the samples.
+        unfitted_differences: The cells that must change so that the unfitted table agrees with the URDF. The
+            tuple is empty if `mistakes` is not empty, or if `is_fitted` is false. The tuple is also empty if
+            a tip error remains after these changes. The tuple is also empty if these cells outnumber the
+            cells in `differences` by more than two.
+        hidden: Row index and name of each hidden cell. A fit of base, tool and joint offsets can compensate
+            for an error in a hidden cell.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
     """
 
@@ -169,7 +171,10 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the tip error (angles multiplied by the reach) is within `tolerance` on all samples."""
+        """Whether the fitted table's tip error is within `tolerance` on all samples.
+
+        An angular error is multiplied by the reach.
+        """
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
@@ -214,7 +219,7 @@ class TableComparison:
 
     @property
     def is_exact_unfitted(self) -> bool:
-        """Whether the written table, with its base, tool and zeros, equals the URDF up to rounding."""
+        """Whether the unfitted table agrees with the URDF on all samples, up to rounding errors."""
         return self.unfitted_metres <= self.rounding_metres and self.unfitted_radians <= self.rounding
 
 

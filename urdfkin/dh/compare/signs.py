@@ -61,12 +61,13 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """Joint signs and offsets for the first joints of the chain.
+    """An alignment of the first joints of the chain with the first rows of the reference table.
 
     Attributes:
         cost: Weighted sum of the differences between cells, plus the cost of reversed joints (metres). Angles
             are multiplied by the reach.
-        offsets: Joint offsets of these joints. The offset of the last of these joints is not yet known.
+        offsets: Joint offset of each of these joints, except for the last joint. The joint offset of the last
+            joint is not yet known.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         delta_in: Offset along z from the last joint's DH frame to its URDF frame (metres).
         free_offset: Row index and sign of a joint offset that can be chosen freely, because the direction of
@@ -85,10 +86,11 @@ class _PartialAlignment:
 def find_sign_fits(
     chain: FrameChain, reference: DHTable, count: int = MAX_PATTERNS, beam_width: int = BEAM_WIDTH
 ) -> list[SignFit]:
-    """Return up to `count` alignments of a path with a standard reference table, the closest first.
+    """Return up to `count` alignments of a path with a standard reference table.
 
-    The table must have the same kinds of joints as the path. With prismatic joints, several combinations of
-    signs may give equal tables, and only a fit can distinguish them.
+    The first alignment differs least from the reference table. The table must have the same kinds of joints
+    as the path. If the path has prismatic joints, several combinations of joint signs may give equal tables.
+    Only a fit can distinguish these combinations.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -135,9 +137,9 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Add joint i + 1 to an alignment of the joints 0 to i.
+    """Extend an alignment of the joints 0 to i by joint i + 1, in each possible way.
 
-    The result has an alignment for each possible transform between the axes, with both directions of x.
+    Each result uses a different transform between the axes of the joints i and i + 1.
     """
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
@@ -178,9 +180,9 @@ def _free_offset(
 
 
 def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the joint offset in `free_offset` so that the row of the last joint has this theta.
+    """Change the free joint offset so that the cell theta of the last joint becomes `theta`.
 
-    The last joint is prismatic.
+    The last joint is prismatic. `partial.free_offset` selects the free joint offset.
     """
     if partial.free_offset is None:
         return partial
@@ -197,7 +199,7 @@ def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float)
 def _possible_transforms(
     A: FloatArray, row: DHRow, delta: float, reach: float, default_phi: float, both_revolute: bool
 ) -> Iterator[AxisTransform]:
-    """Yield the possible transforms between two axes, with both directions of x."""
+    """Yield each possible transform between two axes twice, with opposite directions of x."""
     steps = []
     sine = tilt_sine(A)
     near = abs(math.sin(row.alpha)) < MAX_HAYATI_TILT and sine < MAX_HAYATI_TILT
@@ -208,8 +210,8 @@ def _possible_transforms(
         # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # If the common normal is farther than the reach from an origin, the row becomes a Hayati row.
-        # With reach 0, `find_axis_transform` makes a Hayati row unless the common normal meets both origins.
+        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
+        # With reach 0, a common normal is distant if it misses one of the two origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

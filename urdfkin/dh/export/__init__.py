@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
 _TEXT = "urdfkin.dh.export.text"
-#: For each format: the module that contains its function `write_NAME`, and a description.
+#: For each format NAME: the module that contains the function `write_NAME`, and a description.
 #: The module name is "" if a module of the package `urdfkin.export` contains this function.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),

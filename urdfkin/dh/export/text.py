@@ -30,8 +30,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: A bound is multiplied by this factor, and then rounded up to its last printed digit.
-#: Therefore, a relative rounding error below 1e-12 does not increase this digit.
+#: A bound is multiplied by this factor before the last printed digit is rounded up.
+#: Without the factor, a tiny rounding error of the bound could increase the last digit by 1.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -115,7 +115,7 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
 
 
 def format_bound(value: float) -> str:
-    """Format a bound with three digits, rounded up so that it remains a bound.
+    """Format an upper bound with three digits; the last digit is rounded up.
 
     >>> format_bound(7.5912e-06), format_bound(0.0)
     ('7.60e-06', '0')
@@ -302,9 +302,10 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value (rad or m) of the mimicked joint of a row with a mimic rule.
+    """Return the largest absolute value (rad or m) of the joint that the row's joint mimics.
 
     If the table has no row of the mimicked joint, this value follows from the limits of the mimic joint.
+    Return 0 for a row without a mimic rule.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
