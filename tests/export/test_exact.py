@@ -249,7 +249,7 @@ COUNTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 def test_the_largest_roundings_of_exported_code_are_those_in_the_table(name: str) -> None:
     part, counted = COUNTS[name]
     assert 0.8 * counted < most(all_conspiring, part) <= counted
-    table = (roundings.__doc__ or "").partition("**An export**")[2].partition("**MuJoCo**")[0]
+    table = (roundings.__doc__ or "").partition("**An export.**")[2].partition("**MuJoCo.**")[0]
     assert f" {counted} |" in table
 
 
