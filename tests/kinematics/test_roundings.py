@@ -133,7 +133,7 @@ PARTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 def test_the_table_of_roundings_is_sufficient_and_not_much_too_large(name: str) -> None:
     part, counted = PARTS[name]
     assert 0.8 * counted < most(all_conspiring, part) <= counted
-    table = (roundings.__doc__ or "").split("**A base**")[0]
+    table = (roundings.__doc__ or "").split("**A base.**")[0]
     assert f" {counted} |" in table
 
 
