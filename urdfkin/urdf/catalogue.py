@@ -4,14 +4,15 @@ The catalogue has the robots of example-robot-data and urdfkin's own robots. rob
 package that clones the repository of a robot into a cache at the first use. urdfkin imports a module of
 robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`.
 
-The folder of a package `name` is the first of these folders that exists:
+The function `find_package` searches for the folder of a package `name` in this order, and returns the first
+folder that exists:
 
-1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself, then `src/name`, then each `src/*/name`.
-   `src` itself is a candidate only if the folder `src` is called `name`.
-2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above `referring_file`: the folder itself, then its subfolder `name`.
-   The folder itself is a candidate only if the folder is called `name` or contains a `package.xml` with
-   the package name `name`.
+1. The environment variable `ROS_PACKAGE_PATH` lists folders. In each folder `src` of this list, urdfkin
+   searches for `src/name`, then for each `src/*/name`. If `src` is called `name`, urdfkin first tries `src`.
+2. The environment variable `AMENT_PREFIX_PATH` lists folders. In each folder `prefix` of this list, urdfkin
+   searches for `prefix/share/name`.
+3. For each folder `above` on the path of `referring_file`, urdfkin searches for `above/name`. If `above` is
+   called `name` or contains the `package.xml` of the package `name`, urdfkin first tries `above`.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class CatalogueEntry:
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
-        mimic_problem: Why the mimic rules of the URDF are invalid, or None.
+        mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
         is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """

@@ -2,7 +2,7 @@
 
 The operating system limits the memory and time of the process, and prevents the process from writing files
 and from starting other processes. Python raises an audit event for each opened file, new process, socket and
-import, and an audit hook refuses all events except the allowed ones. The process cannot remove the limits or
+import. An audit hook refuses all events except the allowed events. The process cannot remove the limits or
 the hook. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
@@ -57,7 +57,12 @@ class AllowedPaths:
 
     @classmethod
     def of_file(cls, path: Path, package_paths: list[str], arguments: list[str]) -> AllowedPaths:
-        """Allow a file's folder, package and repository, the search paths, and paths in `arguments`."""
+        """Return the paths that urdfkin may read to load the robot file `path`.
+
+        `roots` contains the folder, the ROS package and the git repository of the file. `roots` also contains
+        the folders in `package_paths`, and the files and folders that `arguments` names. A package,
+        repository or argument is ignored if it is the home folder or `/`.
+        """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for file_name in ("package.xml", ".git"):
             wide += _nearest_folder_with(file_name, path.resolve())
@@ -85,9 +90,9 @@ def _nearest_folder_with(file_name: str, path: Path) -> list[Path]:
 
 
 def _is_inside(root: str, path: str) -> bool:
-    """Return whether `path` is `root`, or a file or folder in `root`.
+    """Return whether `path` is `root`, or is below `root` and not hidden.
 
-    Hidden files and folders in `root`, and the content of hidden folders, do not count.
+    A path is hidden if the name of a file or folder in the path, below `root`, begins with a dot.
     """
     if path == root:
         return True

@@ -51,7 +51,10 @@ _TAB = "    "
 
 
 class ExcerptFormatter:
-    """Shows the lines of a file and underlines the wrong text; `data` has no byte order mark."""
+    """Shows lines of a file and underlines the wrong text of findings.
+
+    `data` contains the bytes of the file without a byte order mark.
+    """
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -141,7 +144,11 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """How Pinocchio treats legal content: it refuses the file, or deviates from the URDF specification."""
+    """The effect of legal content of a URDF on Pinocchio.
+
+    - Refuses: Pinocchio refuses the file.
+    - Differs: Pinocchio deviates from the URDF specification.
+    """
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -164,7 +171,8 @@ class Finding:
         name: The name of the link, joint or material, or None.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
-        other_lines: Line numbers of further findings with the same code, which this finding represents.
+        other_lines: Line numbers of other findings with the same code. This finding represents the other
+            findings.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -471,8 +479,8 @@ class Reporter:
         """Add a finding about an element, or about the line and column `position`.
 
         The finding names the child of `<robot>` that contains the element. If `misplaced` is True, the
-        finding names the element itself. If warnings or notes are combined, the one with the greatest
-        `weight` is reported.
+        finding names the element itself. If several warnings or notes are combined into one finding,
+        the finding with the greatest `weight` represents the others.
         """
         severity = rule.severity if severity is None else severity
         reason = None

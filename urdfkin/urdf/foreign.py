@@ -1,6 +1,8 @@
 """Convert objects of other libraries to URDF: ElementTree, lxml, yourdfpy, and Pinocchio's Model.
 
-The attributes and the module name of an object identify its library, so no library is imported.
+urdfkin recognizes an object of yourdfpy or Pinocchio by the module name of the object's class. An object with
+the attributes `tag`, `attrib` and `iter` counts as an element of ElementTree or lxml. Therefore urdfkin does
+not import yourdfpy, lxml or Pinocchio to recognize an object.
 """
 
 from __future__ import annotations
@@ -50,7 +52,8 @@ class XmlTree(Protocol):
 def convert_to_urdf(source: Any) -> tuple[str, str] | None:
     """Convert an object of yourdfpy, ElementTree or lxml to URDF text.
 
-    Return the text, and the name of the object in messages. Return None for an object of another library.
+    Return the URDF text, and the name that messages use for the object: `<yourdfpy>` or `<ElementTree>`.
+    Return None for an object of another library.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return convert_yourdfpy_robot(getattr(source, "robot", source)), "<yourdfpy>"
@@ -153,8 +156,10 @@ class ConvertedModel:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: By link name, the index of the Pinocchio joint whose frame is the frame of the link.
-        frames: By link name, the index of the Pinocchio frame of the link. Links in `joints` have no entry.
+        joints: Maps the name of a link to the index of a Pinocchio joint. The frame of the joint is the frame
+            of the link.
+        frames: Maps the name of each link that is not in `joints` to the index of a Pinocchio frame. This
+            frame is the frame of the link.
     """
 
     tree: KinematicTree

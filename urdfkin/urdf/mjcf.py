@@ -78,8 +78,8 @@ class Mjcf:
             set `fusestatic`.
         frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
         qpos_index: Index in MuJoCo's qpos of each moving joint, including mimic joints.
-        mimic_equalities: Name of the mimic joint for each equality that is a mimic rule, by the equality's
-            index.
+        mimic_equalities: Maps the index of a MuJoCo equality to the name of a mimic joint. The equality is
+            the mimic rule of this joint.
         other_equalities: Indices of the active joint equalities that are not mimic rules of the tree.
         with_shapes: Whether `model` contains the shapes and inertias of the file.
         aligns_free_bodies: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
@@ -176,8 +176,8 @@ class Mjcf:
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return one number for each frame, shape (n, frames).
 
-        `at_body` contains a number for each body, shape (n, bodies). `own` contains a number for each site,
-        shape (sites,). For a site, the function adds the number of the site to the number of the site's body.
+        The shape of `at_body` is (n, bodies), and the shape of `own` is (sites,). For the frame of a site,
+        the function adds the number of the site in `own` to the number of the site's body in `at_body`.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -570,7 +570,10 @@ def depends_on(rules: Mapping[str, Mimic], joint: str, other: str) -> bool:
 
 
 def resolve_rule(rules: Mapping[str, Mimic], joint: str) -> Mimic:
-    """Combine a chain of mimic rules into one rule relative to an independent joint."""
+    """Combine the mimic rules from `joint` to an independent joint into one rule.
+
+    The mimicked joint of the combined rule is the independent joint.
+    """
     rule = rules[joint]
     while rule.mimicked_joint in rules:
         end = rules[rule.mimicked_joint]

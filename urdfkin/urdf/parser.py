@@ -328,7 +328,10 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration; stop if it has brackets or refers to an external definition."""
+        """Report a document type declaration.
+
+        Stop if the declaration has brackets or refers to an external definition.
+        """
         self.has_content = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -387,7 +390,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: A clearer message and a remedy for each of these messages of expat.
+#: The message and the remedy (or None) that urdfkin reports for an error of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),

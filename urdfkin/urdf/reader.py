@@ -98,11 +98,11 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 
 
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint relative to an independent joint.
+    """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
-    If z mimics y, and y mimics x, the combined rule is z = m2 (m1 x + b1) + b2. urdfkin and Pinocchio
-    combine the rules in the same order: first the rule of y, then the rule of z. Therefore their rounding
-    errors are equal.
+    For example, z mimics y, and y mimics x. The returned rule of z is z = m2 (m1 x + b1) + b2. urdfkin and
+    Pinocchio combine rules in the same order: first the rule of y, then the rule of z. Therefore the rounding
+    errors of urdfkin and Pinocchio are equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

@@ -78,7 +78,8 @@ _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of the nonlinear terms of a MuJoCo joint equality; a mimic rule is linear.
+#: USD attributes for the quadratic, cubic and quartic terms of MuJoCo's joint equality.
+#: A mimic rule of a URDF has no such terms.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -142,8 +143,8 @@ class Usd:
         prims: Path of the prim, by link name. A link without a prim has no entry.
         rest_poses: (n, 4, 4) poses of the prims in the world, in the order of `prims`, in m with z up.
             UsdGeom computes the poses.
-        rest_q: (nq,) configuration of the robot in the poses `rest_poses`. For planar and floating joints,
-            `rest_q` contains the zero configuration.
+        rest_q: (nq,) configuration in which the links have the poses `rest_poses`. For planar and floating
+            joints, `rest_q` contains the zero configuration.
         single_precision: Five numbers for each joint, by joint name. The numbers bound the effect of rounding
             to single precision:
 
@@ -184,7 +185,10 @@ def import_openusd() -> Any:
 
 
 def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage; check each layer before OpenUSD follows its references."""
+    """Return the files of a stage.
+
+    The function checks the references of each layer before OpenUSD follows the references.
+    """
     allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
     files: dict[str, None] = {}
@@ -220,7 +224,10 @@ def find_layer_files(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips, because OpenUSD does not list their files as dependencies of a layer."""
+    """Raise InputError if a prim has value clips.
+
+    A value clip refers to a file. OpenUSD does not list this file among the dependencies of the layer.
+    """
     found: list[str] = []
 
     def visit(path: Any) -> None:
@@ -287,10 +294,11 @@ def read_usd(
 
 
 def _select_variants(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants in the session layer, which is not saved; return the paths of expanded instances.
+    """Select variants of a stage, and return the paths of the instances that the function expands.
 
     OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
-    function expands the instance: the instance becomes an ordinary prim.
+    function expands the instance: the instance becomes an ordinary prim. The function writes only to the
+    session layer, which OpenUSD does not save.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     expanded_instances = set[str]()
@@ -613,7 +621,8 @@ class _StageReader:
             return None
         kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
-        # A pose relative to the world has z up. `UsdJoint` contains poses with the up axis of the stage.
+        # A and B are poses relative to a body, or relative to a world with z up.
+        # `UsdJoint` contains poses relative to a body or to the stage's world, in which y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -626,11 +635,14 @@ class _StageReader:
     def _read_side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return the path of body i of a joint, the joint frame's pose (m) in the body, and two error terms.
+        """Return four values for body i of a joint.
 
-        The path is None for the world. The sum of the third values of both bodies is `_JointPrim.length_sum`.
-        The sum of the fourth values of both bodies is `_JointPrim.rounding`. Return None if the body does not
-        exist or is in a prototype of a point instancer.
+        - The path of the body, or None for the world.
+        - The pose of the joint frame relative to the body (m).
+        - The sum of the lengths (m) of all vectors that are added to compute the position of the joint frame.
+        - Bounds on the rounding errors of the joint frame's position (m) and orientation (rad).
+
+        Return None if the body does not exist or is in a prototype of a point instancer.
         """
         p = np.array(self._read_value(prim, f"physics:localPos{i}"), float)
         quaternion = self._read_value(prim, f"physics:localRot{i}")
@@ -730,7 +742,10 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _read_limit(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
+        """Return a limit of a `PhysicsJoint`.
+
+        Raise InputError if the limit is blocked, because USD readers then use different values.
+        """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and USD readers use different values instead"
@@ -963,7 +978,8 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, the joint frame is also the frame of the child link.
-        # If the frame of the child link differs from the joint frame, a link is inserted between them.
+        # If the frame of the child link differs from the joint frame, the joint moves an additional link.
+        # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
@@ -1049,7 +1065,10 @@ class _StageReader:
             yield by_path[path].name, replace(rule, mimicked_joint=by_path[rule.mimicked_joint].name)
 
     def _read_mimic_rules(self, edge: _JointPrim) -> Iterator[Mimic]:
-        """Yield the mimic rules of a joint, in rad or m; `Mimic.mimicked_joint` is a prim's path."""
+        """Yield the mimic rules of a joint. The offsets are in rad or m.
+
+        `Mimic.mimicked_joint` contains the path of the mimicked joint's prim.
+        """
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:

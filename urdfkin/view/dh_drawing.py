@@ -111,7 +111,8 @@ class _Canvas:
             look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
             # Without this background, a line through a label makes the label illegible.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
-            # Only the labels of x and z axes contain mathematics; names from a file are plain text.
+            # The label of an x axis or a z axis is a formula, for example $x_1$.
+            # All other labels are plain text, because a name in a file may contain "$".
             self.axes.text(*position, ", ".join(texts), parse_math=color in (_X, _Z), **look)
 
 

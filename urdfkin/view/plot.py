@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A panel is a function that draws a motion against the time (s) in the given axes.
+#: A panel is a function that draws one diagram, for example the velocity of the frame.
+#: The arguments are matplotlib's Axes, the motion of the frame, and the time (s) of each sample.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
 #: The dashes of seven lines. The first six lines are distinguishable without colours.
@@ -93,10 +94,10 @@ def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, 
 
 
 def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the disagreement with Pinocchio, and its bound as a thin line, in units of eps * scale.
+    """Draw the disagreement of urdfkin with Pinocchio. Thin lines show the bound on the disagreement.
 
-    eps is 2**-52. Each plotted number is computed as a sum of terms. The scale is an upper bound of the sum
-    of the absolute values of these terms.
+    The unit is eps * scale, with eps = 2**-52. Each number that urdfkin compares is a sum of terms. The scale
+    is an upper bound on the sum of the absolute values of these terms.
     """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.unverified_reason is not None:
@@ -132,8 +133,8 @@ PANELS: dict[str, Panel] = {
 
 #: Suffix that follows "rad" or "m" in the unit of q, v or a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels that draw q, v and a.
-#: Each name selects one panel for each unit of the coordinates: rad, m or no unit.
+#: The names "q", "v" and "a" select panels that draw the coordinates of the robot.
+#: Each name selects up to three panels: one for angles, one for lengths, and one for quaternions.
 COORDINATES = tuple(_PER)
 
 
@@ -161,8 +162,8 @@ def _draw_coordinates(
     """Draw the coordinates in `indices` that change during the trajectory.
 
     If no coordinate changes, the panel shows all coordinates in `indices`. If more than
-    `_MOST_NAMES` coordinates are drawn, the coordinates within their limits are grey. Thin lines are the
-    limits of the coordinates that are not grey.
+    `_MOST_NAMES` coordinates are drawn, the coordinates within their limits are grey. Thin horizontal lines
+    show the finite limits of each coloured coordinate. Grey coordinates have no such lines.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -223,7 +224,10 @@ _VELOCITIES_UNCHECKED = (
 
 
 def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with the named panels of `COORDINATES` and `PANELS`, or with all panels by default."""
+    """Return a figure with the panels that `panels` names. By default, the figure contains all panels.
+
+    The names of panels are the keys of `PANELS` and the names in `COORDINATES`.
+    """
     drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)

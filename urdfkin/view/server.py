@@ -1,7 +1,7 @@
 """Start viser's web server so that only this user's browser can use it, and open its page.
 
 A web server on 127.0.0.1 can be reached by every page in the user's browser and by every user of the machine.
-Four independent measures keep them out:
+Four independent measures protect the viewer:
 
 | measure | protects against |
 |---|---|
@@ -10,14 +10,15 @@ Four independent measures keep them out:
 | a check of the **Origin** header | another page that opens a WebSocket, which browsers allow |
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
-Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
-server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
-each request. Before the viewer shows a robot, this module sends forbidden requests to the running server. If
-the server accepts a forbidden request, this module stops the server. A new version of viser can therefore
-make the viewer fail, but not make the viewer insecure.
+Viser checks neither the Host header nor the Origin header, and has no option for these checks. To start the
+web server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that
+checks each request. Before the viewer shows a robot, this module sends forbidden requests to the running
+server. If the server accepts a forbidden request, this module stops the server. A new version of viser can
+therefore make the viewer fail, but not make the viewer insecure.
 
-The address is not passed to the browser on its command line, which every user of the machine can read.
-Instead the browser opens a file in a private folder. This file redirects the browser to the address.
+Every user of the machine can read the command line of the browser. Therefore the command line does not
+contain the address of the viewer. The browser opens a file in a private folder. This file redirects the
+browser to the address.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ from urdfkin.system.locks import make_fork_safe_lock
 
 
 def has_screen() -> bool:
-    """Return whether a browser that this process starts is visible to the user."""
+    """Return whether the user has a screen on which this process can show a browser."""
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
@@ -114,10 +115,12 @@ class RequestFilter:
         return None
 
     def _is_known(self, host: str) -> bool:
-        """Return whether the Host header of a request names this machine: an IP address or an allowed name.
+        """Return whether the filter accepts the host in a Host header.
 
-        An attacker can make a host name resolve to this machine. An IP address needs no name server, so it is
-        safe. The port in the header is not checked, because a forwarded port differs.
+        The filter accepts `localhost` and each loopback address. If `is_local` is False, the filter also
+        accepts every other IP address, the name `self.host` and the name of this machine. An attacker can
+        make other host names resolve to this machine, but cannot redirect an IP address. The port in the
+        header may be any port, for example a port that the user forwards to the server.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -145,9 +148,9 @@ class RequestFilter:
 def policy(nonce: str, host: str) -> str:
     """Return the Content-Security-Policy header of the viewer's page.
 
-    Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
-    can connect only to this server. Without this rule, viser's client would connect to any server that the
-    parameter `?websocket=` of the address names.
+    The browser runs only scripts with the nonce. The nonce is random for each page, so a name in a URDF
+    cannot inject a script. The page can connect only to this server. Without this rule, a link with the
+    parameter `?websocket=` could connect the page to another server.
     """
     return "; ".join(
         [

@@ -57,9 +57,10 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return arrows for the columns of the Jacobian in a motion `x`.
+    """Return an arrow for each column of the Jacobian `x.jacobian`.
 
-    The motion has one sample, and its reference frame is LOCAL_WORLD_ALIGNED.
+    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. A column with a norm
+    of at most 1e-9 has no arrow.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -72,7 +73,8 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
     """Return an arrow for each part of the acceleration, and an arrow for the sum of the parts.
 
-    The motion `x` has one sample in LOCAL_WORLD_ALIGNED. An acceleration of at most 1e-9 m/s^2 has no arrow.
+    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. An acceleration of at
+    most 1e-9 m/s^2 has no arrow.
     """
     parts = np.vstack([x.breakdown.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
@@ -97,7 +99,7 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
 
-    The motion `x` has one sample in LOCAL_WORLD_ALIGNED.
+    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -110,7 +112,10 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
 
 
 def quaternions_scalar_first(R: FloatArray) -> FloatArray:
-    """Return the quaternions (..., 4) of rotations in viser's order w, x, y, z."""
+    """Convert rotation matrices (..., 3, 3) to quaternions (..., 4) in the order w, x, y, z.
+
+    Viser uses this order.
+    """
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
@@ -124,9 +129,10 @@ _FOV = np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
-    """Return the camera's position and the centre of the view (m) in which points (n, 3) fill the picture.
+    """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
-    `fov` is the vertical field of view (rad), and `aspect` is the width divided by the height.
+    The picture then shows all `points` (n, 3), with a margin at the edges. `fov` is the vertical field of
+    view (rad). `aspect` is the width of the picture divided by the height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _TO_CAMERA / np.linalg.norm(_TO_CAMERA)

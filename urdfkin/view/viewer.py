@@ -137,8 +137,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # The conversion of units can round a value.
-                # A slider that already has the value is therefore not set again.
+                # Without this test, the conversion to degrees could change the last digits of a slider.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:

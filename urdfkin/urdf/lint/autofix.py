@@ -47,7 +47,8 @@ class FixResult:
     """The text of a file after the fixes.
 
     Attributes:
-        unfixed_reasons: For each code whose findings were not fixed, the reason.
+        unfixed_reasons: Maps the code of a rule to the reason why `fix_text` did not fix findings with this
+            code.
     """
 
     text: UrdfText
@@ -143,7 +144,10 @@ _SLACK = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`, computed without rounding."""
+    """Return whether the angle between two vectors is at most `MAX_AXIS_TILT`.
+
+    The function computes with fractions, which have no rounding errors.
+    """
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)

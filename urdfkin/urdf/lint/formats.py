@@ -105,7 +105,10 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 
 
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code, the most frequent first; `[*]` marks codes with fixes."""
+    """Yield a line for each code. The code with the most findings comes first.
+
+    The mark `[*]` means that urdfkin can fix findings with this code.
+    """
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count

@@ -53,8 +53,9 @@ def key_of(finding: Finding, file: str) -> Key:
 class Baseline:
     """Known findings, counted by key.
 
-    File names in the keys are relative to the folder `root`. If this run encounters a known finding, the
-    number in `counts` decreases and `match_count` increases.
+    File names in the keys are relative to the folder `root`. `counts` contains the number of known findings
+    that the current run has not found yet. `match_count` is the number of known findings that the run has
+    found.
     """
 
     counts: Counter[Key]
@@ -100,8 +101,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If there is an older baseline at `path`, its entries are copied, except entries whose file is in `files`
-    or no longer exists.
+    If the file `path` contains an older baseline, the function also copies entries of the older baseline. An
+    entry is not copied if the file in the entry is one of `files` or no longer exists.
     """
     counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -239,7 +240,8 @@ class FindingFilter:
     ) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        The returned function counts known findings, so call it once for each finding, in file order.
+        The returned function counts known findings. Therefore call the returned function exactly once for
+        each finding, in file order.
         """
         codes = self.codes - self.settings.ignored_codes(text.label)
         known = [baseline for baseline in (self.baseline, older_findings) if baseline is not None]
@@ -269,8 +271,8 @@ def find_known_findings(
 
     An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
     If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.
-    Second, files can be deleted after the older version. If the URDF contains the name of a deleted file,
-    all findings about missing meshes are new.
+    Second, a mesh file that exists in the older version may be missing now. If the URDF contains the name of
+    a deleted file, all findings about missing meshes are new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:

@@ -183,7 +183,8 @@ ATTRIBUTES = {
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
 _POSE_NAMES_ELSEWHERE = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes that `--fix` does not remove, because other elements or formats define them.
+#: Names that URDF, a simulator or another format defines for an element or an attribute.
+#: `--fix` does not remove an unknown attribute with one of these names.
 _DEFINED_ELSEWHERE = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_ELSEWHERE | EXTENSIONS
 
 #: Child elements that may occur only once in an element, by the tag of the element.
@@ -363,9 +364,10 @@ def _find_undeclared_prefixes(root: Element) -> dict[str, list[_Occurrence]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix of an element, with the name of the attribute that contains the prefix.
+    """Yield the namespace prefixes in the attribute names and in the tag of an element.
 
-    If the tag of the element contains the prefix, the attribute name is None.
+    The second value of a pair is the name of the attribute with the prefix, or None for the prefix of the
+    tag.
     """
     if ":" in element.tag and not element.tag.startswith(_PREFIXES_OF_OTHER_RULES):
         yield element.tag.partition(":")[0], None

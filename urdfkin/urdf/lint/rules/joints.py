@@ -221,7 +221,10 @@ def _check_snapped_axis(
 
 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
-    """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
+    """Return the angle (rad) by which Pinocchio rotates the axis of a joint, by joint name.
+
+    A joint has no entry if Pinocchio does not change the axis.
+    """
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
@@ -429,7 +432,8 @@ class _MimicChecker:
         if low <= high and high - low >= least:
             return
         # `restrict_range` narrows the allowed range by a rounding error at each end.
-        # A range with only one value can become empty, so the code tests each end separately.
+        # If the limits allow only one end of the range, the narrowed range can be empty.
+        # The next line therefore calls `restrict_range` for each end alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -515,8 +519,8 @@ NOTICEABLE_DISPLACEMENT = 1e-3
 #: If an angle differs from a multiple of pi by at most this number (rad), the difference is not reported.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs of a multiple of pi and a minimum number of decimals.
-#: A number with fewer decimals is not reported as a rounded form of this multiple.
+#: Pairs of a factor k and a number of decimals.
+#: An angle in a file counts as a rounded k * pi only if the angle has at least this number of decimals.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -563,7 +567,10 @@ def _bounds_text(limit: LimitRecord) -> str:
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """Report rounded multiples of pi in an origin; the message names the least accurate multiple."""
+    """Report angles of a joint origin that are rounded multiples of pi.
+
+    The message quotes the angle with the largest rounding error.
+    """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
@@ -601,7 +608,9 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
+    """If an angle is a rounded k * pi or -k * pi, return k and the exact angle. Otherwise return None.
+
+    `text` is the angle as written in the file, and `angle` is the number (rad).
 
     >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)

@@ -43,11 +43,11 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: A finding mentions an MJCF element with one of these tags by the tag alone, without a name.
+#: Tags of MJCF elements. A finding about such an element does not contain the name of the element.
 #: The key is the tag in the file, and the value is the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Pattern for the start of a prim in a USD text file.
-#: The pattern also matches delimiters of comments, strings, references, arrays and blocks.
+#: Pattern that matches the beginning of a prim in a USD text file, or a delimiter.
+#: A delimiter is a parenthesis, a brace, or the beginning of a comment, a string, a reference or an array.
 _PRIM_OR_DELIMITER = re.compile(
     rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
 )
@@ -114,7 +114,10 @@ def _make_finding(
 def _find_positions(
     data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]
 ) -> _Positions:
-    """Return the position of each element, or of the first element if elements have the same name."""
+    """Return the position of each element in the file.
+
+    If several elements have the same tag and name, the function returns the position of the first element.
+    """
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_MAX_SEARCHED_BYTES]):
         found.setdefault((element, name), (first, last))
