@@ -118,12 +118,16 @@ class CertificateDocument(Header):
     robot: Annotated[str, doc("The robot's name.")]
     source: Annotated[str, doc("Source of the robot: a path, a catalogue name, or <text>.")]
     source_notes: Annotated[
-        str, doc("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
+        str,
+        doc(
+            "Text about the checked conversion of another format to URDF, and about locked joints;"
+            " empty for a URDF without locked joints."
+        ),
     ]
     oracle: Annotated[str, doc("Name and version of the oracle.")]
     lines: Annotated[list[LineEntry], doc("One entry for each computed quantity.")]
     not_verified: Annotated[
-        list[str], doc("Reasons why results were not checked; empty if all were checked.")
+        list[str], doc("Reasons why results were not checked; empty if every result was checked.")
     ]
 
 
