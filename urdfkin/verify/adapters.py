@@ -7,9 +7,9 @@ environment in which one library is installed:
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration maps each independent joint to its value. The value of a revolute or prismatic joint is
-one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The value of a floating
-joint is seven numbers (x, y, z, qx, qy, qz, qw).
+case. A configuration maps the name of each independent joint to the joint's value. The value of a revolute or
+prismatic joint is one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The
+value of a floating joint is seven numbers (x, y, z, qx, qy, qz, qw).
 
 An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
 joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the
@@ -48,8 +48,9 @@ _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 class LibraryModel:
     """A robot that a library has read from a file.
 
-    `joints` lists the joints with a coordinate, in the library's order. `poses` returns the pose (4, 4) of
-    each link relative to the root link. Links that the library merges into other links are missing.
+    `joints` lists the joints with a coordinate, in the library's order. `poses` is a function that returns
+    the pose (4, 4) of each link relative to the root link. If the library has merged a link into another
+    link, the result does not contain the merged link.
     """
 
     joints: list[str]

@@ -26,8 +26,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
     - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
 
-    The derivative of each angle is the dot product of the angular velocity and a vector of the reciprocal
-    basis of the three axes.
+    The reciprocal basis of the three rotation axes has one vector for each angle. The derivative of an angle
+    is the dot product of this vector and the angular velocity.
 
     `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. `R`
     (..., 3, 3) is the rotation from body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian

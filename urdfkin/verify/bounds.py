@@ -7,8 +7,8 @@ this bound:
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
-orders. Large terms may cancel, so that both sums are small. The bound on their rounding errors is still
-proportional to the scale.
+orders. Large terms may cancel, so that both sums are small. The rounding errors of small sums can still be as
+large as eps times the scale.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
@@ -35,11 +35,11 @@ have the same sign. Reports give each difference as a multiple of eps * scale. T
 between small and large robots.
 
 *Magnitudes.* `compute_magnitudes` replaces each vector by its length and evaluates the equations 7.58 and
-7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds
-the result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms
-differ by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this
-cross product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha
-therefore uses w_i instead of w_{i-1}.
+7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). After this replacement, no term is negative, so no
+intermediate value exceeds the result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i
+w_i x z. The two terms differ by the cross product v_i^2 z x z, which is 0 except for rounding errors. The
+rounding errors of this cross product are large for fast joints with an oblique axis. The bound on the angular
+acceleration alpha therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -67,7 +67,8 @@ KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
 _BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
-#: Number of configurations that the kernel `lengths` processes at once; their data fit into the L1 cache.
+#: Number of configurations in a block of the kernel `lengths`.
+#: The data of a block fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -81,9 +82,9 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the error of one rotated vector, in eps of the vector's length.
-            Each factor of a term is a rotated vector. The bound counts all URDF joints on the path, and one
-            additional joint as a margin. A base with a rotation counts as one more joint.
+        roundings: (n, frames) upper bound on the rounding error of a rotated vector, divided by eps times the
+            vector's length. Each factor of a term is a rotated vector. The bound counts all URDF joints on
+            the path, and one additional joint as a margin. A rotated base counts as one more joint.
     """
 
     p: FloatArray
@@ -164,7 +165,10 @@ def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint; `multiplier` and `offset` are the absolute values in the joint's mimic rule."""
+    """A moving joint.
+
+    `multiplier` and `offset` are the absolute values of the joint's mimic multiplier and mimic offset.
+    """
 
     kind: int
     q: int
@@ -271,7 +275,8 @@ def _propagate_state(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: A
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles becomes inf, and no result is then accepted.
+#: A scale above the range of doubles becomes inf.
+#: The comparison accepts no result with an infinite scale.
 _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -282,8 +287,9 @@ class Bound:
     `k` and `scale` can be broadcast to the shape of the results.
 
     Attributes:
-        scale: Upper bound on the sum of the absolute values of the terms of a number, in the unit of this
-            number. If the scale is 0, the results of urdfkin and of the oracle must be equal.
+        scale: Each number of a result is a sum of terms. The scale is an upper bound on the sum of the terms'
+            absolute values, in the unit of the number. If the scale is 0, the results of urdfkin and of the
+            oracle must be equal.
         k: Allowed difference in multiples of eps * scale.
     """
 
@@ -294,7 +300,8 @@ class Bound:
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the bound's `k` for each result, as an array of shape `leading`.
 
-    If `k` is 0, negative or infinite, the function replaces `k` by NaN. No result is then within the bound.
+    If `k` is 0, negative or infinite, the function replaces `k` by NaN. If `k` is NaN, no result is within
+    the bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -315,9 +322,9 @@ def make_bound(
 
 @_allow_overflow
 def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
-    """Return the upper bounds on terms (`Magnitudes`) for a comparison of urdfkin with MuJoCo.
+    """Return the `Magnitudes` for a comparison of urdfkin's results with MuJoCo's results.
 
-    `magnitudes` contains the upper bounds for a comparison with Pinocchio.
+    The argument `magnitudes` contains the `Magnitudes` for a comparison with Pinocchio.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
     `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
@@ -346,9 +353,9 @@ class DecimalErrors(NamedTuple):
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
         rule_count: Number of mimic rules of the joints on the path. If a joint mimics another mimic joint,
             the number includes the rules of both joints.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. If terms in a chain of mimic rules
-            cancel each other, their rounding errors do not cancel. The added length of a prismatic mimic
-            joint is then positive.
+        lengths: (steps + 1,) additional lengths for `CompiledTree.lengths`, m. The terms of a chain of mimic
+            rules may cancel, but the rounding errors of the terms do not cancel. A prismatic mimic joint with
+            such a chain therefore has a positive additional length.
     """
 
     angles: FloatArray
@@ -359,7 +366,7 @@ class DecimalErrors(NamedTuple):
 def true_value_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
-    """Return the upper bounds on terms (`Magnitudes`) for a comparison of one program with the true values.
+    """Return the `Magnitudes` for a comparison of one program's results with the true values.
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
     values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each
@@ -368,28 +375,29 @@ def true_value_magnitudes(
     true value have an error of half an eps each. The error of the axis counts twice, because two rotations
     use the axis. The conversion of two kinds of numbers causes larger errors:
 
-    - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
-      rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
-    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
-      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps. The error of x is
-      multiplied by |m|.
+    - The relative error of roll, pitch and yaw is half an eps. All vectors after the joint therefore rotate
+      by at most eps (|roll| + |pitch| + |yaw|) / 2.
+    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum cause an error of
+      at most eps (3 |m x| + |c|) / 2. The rounding of c causes an error of at most eps |c| / 2. The error
+      of x is multiplied by |m|.
 
     *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
     sum of the absolute values of all terms in the joint's value. For an independent joint, X is |q|. For a
-    joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules to one
-    rule M q + C. The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum
-    exceeds X, so the combined rule adds an error of at most (r - 1) / 2 X eps. All other rounding errors are
-    the same as in a program that applies the r rules one after the other.
+    joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules into one
+    rule M q + C. The number C is a sum of r terms, which requires r - 1 additions. No intermediate sum
+    exceeds X, so each addition has an error of at most eps X / 2. The bound therefore allows an additional
+    error of eps (r - 1) X / 2 for the sum C. All other rounding errors of the combined rule are the same as
+    in a program that applies the r rules one after the other.
 
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
     *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement therefore has an
-    error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
+    error of at most 1.5 r X eps, with separate rules and with a combined rule. If the offsets of a chain
     cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
-    displacement. With this length, the bound allows an error of 3/2 eps for each rule. This bound also covers
-    the joint's velocity and acceleration. Velocity and acceleration are rounded less often than the
-    displacement.
+    displacement. With this length, the bound allows a relative error of 1.5 eps for each rule. This bound
+    also covers the joint's velocity and acceleration. Velocity and acceleration are rounded less often than
+    the displacement.
 
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
@@ -428,7 +436,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     of a position changes by at most the angle error times the length of the path. To first order, the numbers
     therefore change by at most `angles` * eps/2 * scale. The function multiplies the scale by 1 + `angles` /
     k, so the bound increases by `angles` * eps * scale. The increase of the bound is twice the first-order
-    change of the numbers. The increase therefore also covers second-order terms.
+    change of the numbers. The factor of two covers second-order terms.
 
     `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
     lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
@@ -453,8 +461,8 @@ def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
 def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
-    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel, so the scale
-    includes the term w x vel.
+    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel. The scale
+    therefore includes the term w x vel.
 
     *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
     d_k be the vector from joint k to the frame. Let w_k be the sum of the absolute values of the joint
@@ -466,8 +474,8 @@ def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Re
     - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
       sums in eq. 7.77.
     - For n joints, the breakdown has 4 n terms. The sum of these terms has n + 3 rounding errors.
-    - The bound allows 2 eps for the sums at each joint. This is more than the rounding errors of d_k and of
-      the sum of 4 n terms.
+    - For each joint, the bound allows 2 eps for the sums. The sums for d_k and the sum of the 4 n terms
+      together have smaller rounding errors.
     """
     shared = eq.tangential(magnitudes.w, magnitudes.vel)
     linear = magnitudes.acc + shared
@@ -525,11 +533,12 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: In the linear rows, Pinocchio's derivative of Jacobian column i by joint j is a sum of cross products.
+#: Numbers of cross products that Pinocchio adds to compute the linear rows of a Hessian entry.
+#: A Hessian entry is the derivative of Jacobian column i with respect to the coordinate of joint j.
 #: The joints on the path are numbered from the root.
-#: The first pair of numbers is valid for j <= i, the second pair for j > i.
-#: The first number of a pair is the number of products z x (z x d), if both joints are revolute.
-#: The second number is the number of products z x z, if one joint is revolute and the other is prismatic.
+#: Each reference frame has two pairs of numbers: one pair for j <= i, and one pair for j > i.
+#: The first number of a pair counts the products z x (z x d) of two revolute joints.
+#: The second number of a pair counts the products z x z of a revolute joint and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -552,10 +561,10 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
     - one for the conversion of the result to the frame's origin p: p x (w_1 x w_2)
     - two for the conversion of a column to p before the product: (v - p x w) x w.
 
-    In the linear rows, urdfkin computes one product z x (z x d), or the two products of c_1 x c_2. In LOCAL,
-    urdfkin first rotates the two columns by R. Each of the two products then has the five factors R, z, R, z
-    and d, and the two products have 10 factors. The bound allows 12 factors: three products of four factors
-    each.
+    In the linear rows, urdfkin computes one product z x (z x d) for LOCAL_WORLD_ALIGNED, and the two products
+    of c_1 x c_2 for LOCAL and WORLD. For LOCAL, urdfkin rotates the two columns by R before the products.
+    Each of the two products has the five factors R, z, R, z and d. The two products together have 10 factors.
+    For LOCAL, the bound allows 12 factors: three products of four factors each.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -604,10 +613,11 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
     more than the path contains. For the additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` =
     24 eps, which is more than 13 eps.
 
-    `bound` is the bound of the velocity Jacobian, and `axis_sine` (n, frames) is s of Pinocchio's rotation.
+    `bound` is the bound of the velocity Jacobian. `axis_sine` (n, frames) contains s for the rotations that
+    the oracle computes.
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # If s is not larger than its rounding error, the scale is not finite, and no result is accepted.
+    # If s is not larger than the rounding error of s, the scale is not finite, and no result is accepted.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -623,8 +633,8 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     velocity Jacobian. Let delta be the error of R. The elements of the matrix 4 q q^T are linear functions of
     R. The longest row of this matrix has a length of at least 2. The error of this row is below 4.6 delta, so
     the error of q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an
-    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|, the bound on the angular velocity in
-    the velocity Jacobian.
+    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|. The bound on the angular rows of the
+    velocity Jacobian is also 2 delta |w|, so this bound is valid for the derivative of q.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -666,11 +676,14 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def find_active_entries(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
+    """Return a bool array (frames, 6, nv) that is False for Jacobian entries that are always 0.
 
-    The linear rows of a revolute column are z x d. In WORLD, d leads from the joint to the root. Otherwise, d
-    leads from the joint to the frame. The vector d is 0 for every q if the path between the two ends of d has
-    no length and no prismatic joint.
+    For LOCAL and LOCAL_WORLD_ALIGNED, a False entry is 0 for every q and every motion of the base. For WORLD,
+    a False entry is 0 for every q if the root is at the world origin.
+
+    The linear rows of a revolute joint's column are z x d. In WORLD, d leads from the joint to the root. In
+    the other reference frames, d leads from the joint to the frame. The vector d is 0 for every q if all
+    lengths between the ends of d are 0, and no joint between the ends translates.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE

@@ -27,7 +27,7 @@ _PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
 class CallPart(NamedTuple):
-    """Some of the configurations of a call, as inputs of urdfkin and as inputs of the oracle.
+    """A part of a call's configurations, converted for urdfkin and for the oracle.
 
     `rates` is an empty tuple for a placement, (v,) for a velocity, and (v, a) for an acceleration. The arrays
     v and a have the shape (n, nv). `state` (n or 1, 24) is the state of the moving base. `query` is the input
@@ -44,7 +44,7 @@ class CallPart(NamedTuple):
 
 
 class Call:
-    """The inputs of one call as flat batches.
+    """The inputs of one call, converted to batches with one axis.
 
     `given` contains q, or q and v, or q, v and a. `also` names frames that are computed but not returned.
 
@@ -112,8 +112,8 @@ class Call:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
-        `reshape` of a NumPy matrix may return an unexpected shape. A kernel would then write past the end of
-        the array.
+        `reshape` of a NumPy matrix may return an unexpected shape. For an unexpected shape, a kernel would
+        write past the end of the array.
         """
         if out is None:
             return None
@@ -135,7 +135,10 @@ class Call:
         return out.reshape(self.n, len(self.links), *shape)
 
     def restore_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame adds no axis."""
+        """Reshape a result (n, frames, ...) to the caller's batch shape.
+
+        If the caller gave one name instead of a list of frames, the result has no axis for frames.
+        """
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:

@@ -26,7 +26,9 @@ _ledger_lock = make_fork_safe_lock()
 
 
 class VerificationError(UrdfkinError):
-    """urdfkin and the oracle differ by more than rounding can explain, so one of them is wrong.
+    """The results of urdfkin and the oracle differ by more than rounding can explain.
+
+    One of the two results is wrong.
 
     Attributes:
         quantity: Name of the quantity.
@@ -75,7 +77,7 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class CertificateLine:
-    """The line of a certificate about one quantity.
+    """One line of a certificate: the data about one quantity.
 
     Attributes:
         checked: Number of results that the oracle confirmed.
@@ -116,12 +118,16 @@ class CertificateDocument(Header):
     robot: Annotated[str, doc("The robot's name.")]
     source: Annotated[str, doc("Source of the robot: a path, a catalogue name, or <text>.")]
     source_notes: Annotated[
-        str, doc("Result of checking the conversion of the source to URDF; empty if the source is a URDF.")
+        str,
+        doc(
+            "Text about the checked conversion of another format to URDF, and about locked joints;"
+            " empty for a URDF without locked joints."
+        ),
     ]
     oracle: Annotated[str, doc("Name and version of the oracle.")]
     lines: Annotated[list[LineEntry], doc("One entry for each computed quantity.")]
     not_verified: Annotated[
-        list[str], doc("Reasons why results were not checked; empty if all were checked.")
+        list[str], doc("Reasons why results were not checked; empty if every result was checked.")
     ]
 
 
@@ -141,8 +147,9 @@ class Certificate(Displayable):
         robot: The robot's name.
         oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
         lines: One line for each computed quantity.
-        not_verified: Reasons why results were not checked; empty if all were checked.
-        source_notes: Result of the check of the conversion to URDF from another format; empty for a URDF.
+        not_verified: Reasons why results were not checked; empty if every result was checked.
+        source_notes: Text about the checked conversion of another format to URDF, and about locked joints.
+            For a URDF without locked joints, the text is empty.
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: SHA-256 digest of the MJCF or USD file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.
@@ -255,8 +262,8 @@ class Account:
     Attributes:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         disabled_checks: Number of results of calls with verify=False.
-        counters: A pair (array, index) for each compiled function that computes results without checks.
-            The function counts its results in array[index].
+        counters: A pair (array, index) for each compiled function that computes results without checks. The
+            compiled function counts the results in array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -275,7 +282,7 @@ class Account:
 
 @dataclass
 class Ledger:
-    """Counts the checked and the unchecked results of a robot, from any number of threads."""
+    """Counts the checked and the unchecked results of a robot. Several threads may use a ledger at once."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)

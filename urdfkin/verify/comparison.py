@@ -79,8 +79,8 @@ def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf if `ours`, `theirs` or `scale` is not finite, or if the scale is 0 and the two numbers
-    differ.
+    The result is inf if `ours`, `theirs` or `scale` is not finite. If the scale is 0 and the two numbers
+    differ, the result is also inf.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
     difference = np.abs(ours - theirs)
@@ -108,7 +108,7 @@ def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray,
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If several results have the same row of the scale, the kernel needs arrays for intermediate values.
+        # If there are fewer rows of the scale than results, the kernel needs working memory.
         if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
@@ -123,7 +123,7 @@ def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> Flo
 
 
 def load_kernels() -> None:
-    """Compile or load all Numba kernels, so that worker processes do not compile them."""
+    """Compile or load all Numba kernels, so that worker processes need not compile the kernels."""
     preload.load_all_kernels()
     for name in (*CHECK_KERNELS, "lengths"):
         preload.load_kernel(name, KERNELS)

@@ -12,8 +12,9 @@
 `check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
 cannot check the robot.
 
-urdfkin writes a URDF text for a table or for a `pinocchio.Model`. Pinocchio reads the same text to check a
-robot's results, so the usual checks do not find an error in the text.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio both compute from this
+text, so a comparison of the two results does not find an error in the text. `check_table_source` and
+`check_model_source` find such an error.
 """
 
 from __future__ import annotations
@@ -64,15 +65,17 @@ _ROUNDINGS = 16.0
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
+    A joint frame of the chain is the frame before the joint's motion, seen in the direction of the chain.
     Pinocchio's frame of a joint is the frame of the child link. If the chain leads from the parent link to
-    the child link, Pinocchio's frame includes the joint's motion. If the chain leads from the child link to
-    the parent link, Pinocchio's frame does not include the motion.
+    the child link, Pinocchio's frame is the frame after the joint's motion. The function therefore subtracts
+    the displacement of a prismatic joint. If the chain leads from the child link to the parent link,
+    Pinocchio's frame is the frame before the joint's motion.
 
     Pinocchio computes along two paths: from the root to the first frame of the chain, and from the root to
-    the last frame. urdfkin computes along the chain, which is a part of the two paths. The bound allows for
-    the rounding errors of all joints on both paths of Pinocchio. The length in the bound is the distance of
-    the first frame from the root plus the length of the chain. The length of the chain includes prismatic
-    displacements.
+    the last frame. urdfkin computes along the chain, which is a part of the two paths. The bound therefore
+    counts the rounding errors of all joints on the two paths. The bound on a position is proportional to a
+    length: the distance from the root to the first frame, plus the length of the chain. The length of the
+    chain includes prismatic displacements.
     """
     if verifier.find_refusal() is not None:
         return None
@@ -262,7 +265,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
     # The rotation matrices of the table's base and tool may be rounded to six digits.
-    # The rotations in the URDF are exact, so the bound includes the rounding of the table's matrices.
+    # The URDF contains exact rotations.
+    # The bound therefore includes the deviation of the table's matrices from rotation matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

@@ -62,9 +62,11 @@ def check_relative_placement(
     """Return an oracle's relative placements (n, frames, 4, 4), and the bound on the difference.
 
     `compute_bound` computes the bound of placements in the world. The relative placement is the pose of frame
-    b relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and
-    k_a rounding errors. The path to frame b has the length s_b and k_b rounding errors. Errors in multiples
-    of eps:
+    b relative to frame a; frame a is the last frame of `x.plan`.
+
+    Let s_a be the length of the path from the world origin to frame a. Let k_a be the number of rounding
+    errors that the bound allows for the placement of frame a. The numbers s_b and k_b are the same numbers
+    for frame b. The table contains errors in multiples of eps:
 
     | Number | Source | Error at most |
     |---|---|---|

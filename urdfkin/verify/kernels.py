@@ -84,7 +84,7 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """For each column of three rows, write the largest difference between `ours` and `theirs` to `units`.
+    """Compare three rows of `ours` and `theirs`; write the largest difference of each column to `units`.
 
     The three rows have the same scale. The differences are divided by `unit`, which is eps * scale; a
     quotient may be NaN or inf.
@@ -101,10 +101,11 @@ def _divide_triples(ours, theirs, unit, width, units):
 
 @inline_function()
 def _largest_bits(x, count):
-    """Return the bit pattern of the largest of several numbers, which are non-negative, inf or NaN.
+    """Return the bit pattern of the largest of `count` doubles.
 
-    Bit patterns of non-negative doubles, compared as integers, have the same order as the doubles. The sign
-    bit, which some processors set for NaN, is removed.
+    The doubles are non-negative, inf or NaN. Compared as integers, bit patterns of non-negative doubles have
+    the same order as the doubles. Some processors set the sign bit of NaN, so the function removes the sign
+    bit.
     """
     most = 0
     for j in range(count):
@@ -125,10 +126,12 @@ def _largest_bits(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
-    The rows of `scale` are repeated if `scale` has fewer rows than `out`. The kernel can then use `unit` and
-    `units` as working memory. `unit` has as many numbers as `scale`, and `units` has as many numbers as one
-    row. Without repeated rows, the kernel uses neither array. `out_bits` and `bits` are views of `out` and
-    `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum of doubles.
+    If `scale` has fewer rows than `out`, the kernel repeats the rows of `scale`, and may use the arrays
+    `unit` and `units` as working memory. `unit` has as many numbers as `scale`. `units` has as many numbers
+    as one row of `scale`. If `scale` has as many rows as `out`, the kernel does not use the working memory.
+
+    `out_bits` and `bits` are views of `out` and `units` as integers. The compiler can vectorize the maximum
+    of integers, but not the maximum of doubles.
     """
     known = in_triples = len(scale) < len(out)
     for k in range(len(scale)):

@@ -3,10 +3,11 @@
 Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
 from the MJCF file to the tree. `load` therefore makes three comparisons:
 
-- the placements of bodies and sites with those of MuJoCo's model of the file
-- the mimic rules with the joint equalities of MuJoCo's model
-- the placements with those of Pinocchio's MJCF reader, which reads some files differently. A difference from
-  Pinocchio is reported, but is not an error.
+- MuJoCo compiles the file and computes the placements of bodies and sites. The tree must have the same
+  placements.
+- The joint equalities of MuJoCo's model must agree with the tree's mimic rules.
+- Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently, so a
+  difference from Pinocchio is reported, but is not an error.
 """
 
 from __future__ import annotations
@@ -47,9 +48,9 @@ _MAX_QUOTE_LENGTH = 300
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    `remarks` contains elements of the file that the tree does not contain. `shapes_refusal` is the reason why
-    MuJoCo compiled the file only without shapes and inertias. `pinocchio` is a report about Pinocchio's
-    reader.
+    `remarks` contains elements of the file that the tree does not contain. If MuJoCo rejects the complete
+    file, the process compiles the file without shapes and inertias. `shapes_refusal` is the reason for the
+    rejection, or None if MuJoCo compiled the complete file. `pinocchio` is a report about Pinocchio's reader.
     """
 
     urdf: str
@@ -65,9 +66,9 @@ def read_mjcf(
 ) -> MjcfReading:
     """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
-    MuJoCo also reads included files. With `check`, MuJoCo also computes placements for `check_mjcf_source`.
-    Raises InputError if MuJoCo is missing, rejects the file or exceeds a limit, or if the robot has a ball
-    joint.
+    MuJoCo also reads included files. If `check` is True, the process also computes the data for
+    `check_mjcf_source`, for example placements. Raises InputError if MuJoCo is missing, rejects the file or
+    exceeds a limit, or if the robot has a ball joint.
     """
     version()
     name = source_name(source)
@@ -150,7 +151,7 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio of error to bound over all mimic rules; None without mimic rules."""
+    """Return the largest ratio of error to bound over all mimic rules; None if there are no rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -83,10 +83,11 @@ def write_answer(answer: Mapping[str, Any]) -> None:
 def parse_answers(
     output: bytes, status: int | None, *, library: str, name: str, timeout: float
 ) -> tuple[list[dict[str, Any]], str]:
-    """Return the answers in the output of a process, and the reason why further answers are missing.
+    """Return the answers that a process wrote, and a text about the end of the process.
 
-    Incomplete lines and lines that libraries print are skipped. A `status` of None means that the process ran
-    longer than `timeout` (s). Raises InputError if the process reports an error.
+    The text explains why answers may be missing. Each answer is a line of JSON. The function skips incomplete
+    lines and the lines that libraries print. A `status` of None means that the process ran longer than
+    `timeout` (s). Raises InputError if the process reports an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -102,9 +103,12 @@ def parse_answers(
 
 
 def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
+    """Yield the answers to a request.
 
-    `samples` is the number of random configurations besides the zero configuration; 0: no configurations.
+    The entry `path` of the request is the path of the MJCF file, or None. If `path` is None, the entry `text`
+    is the MJCF text. The entry `name` appears in messages. If the entry `samples` is 0, the answers contain
+    no placements. Otherwise, the answers contain the placements at the zero configuration and at `samples`
+    random configurations.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -211,8 +215,9 @@ def _pinocchio_placements(
 def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
-    Pinocchio combines several joints of a body into one joint with the name `Composite_` and the name of the
-    first joint. In q, each of the combined joints has one number.
+    If a body has several joints, Pinocchio combines these joints into one composite joint. For example,
+    Pinocchio combines the joints `x` and `y` into the joint `Composite_x`. In Pinocchio's q, each of the
+    combined joints has one number.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

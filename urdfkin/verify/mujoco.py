@@ -1,8 +1,8 @@
 """The oracle MuJoCo.
 
 MuJoCo reads the origins and axes of joints from the URDF text with its own parser. Unlike urdfkin and
-Pinocchio, MuJoCo computes with unit quaternions, and its six-vectors refer to a centre of mass. This module
-changes the text before MuJoCo reads it:
+Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
+module changes the text before MuJoCo reads it:
 
 - Each link becomes a body. Meshes and inertials are removed, and only the root has a mass. The centre of
   mass, to which MuJoCo's results refer, is therefore the root's origin.
@@ -46,8 +46,9 @@ from urdfkin.verify.pinocchio import tree_depth
 
 #: Placeholder for the mass (kg) and the moments of inertia (kg m^2) of each link.
 _MASS = "1"
-#: Maximum number of links in a chain; MuJoCo's loading time grows with the square of this number.
-#: MuJoCo itself rejects chains of more than 1,023 links, but only after the loading time.
+#: Maximum number of links in a chain.
+#: MuJoCo's loading time grows with the square of the number of links.
+#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
 _MAX_DEPTH = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _REPLACEMENT_JOINTS = {
@@ -55,7 +56,7 @@ _REPLACEMENT_JOINTS = {
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Number of coordinates and number of joint velocities of a joint in urdfkin, by the kind of the joint.
+#: Maps a joint's kind to the numbers of coordinates and of joint velocities in urdfkin.
 #: All other kinds have one coordinate and one joint velocity.
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
@@ -71,11 +72,11 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """Indices of a moving joint's first values in the vectors of MuJoCo and of urdfkin, and its mimic rule.
+    """A moving joint's first indices in the vectors of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    `qpos` and `qvel` are indices in MuJoCo's vectors; `q` and `v` are indices in urdfkin's vectors. The index
-    -1 means that urdfkin's vector has no value for the joint: `q` and `v` of a moving base, and `v` of a
-    locked joint. A locked joint has the multiplier 0, and its offset is the locked value.
+    `qpos` and `qvel` are indices in MuJoCo's vectors. `q` and `v` are indices in urdfkin's vectors. An index
+    is -1 if urdfkin's vector has no value for the joint. For a moving base, `q` and `v` are -1. For a locked
+    joint, `v` is -1, `multiplier` is 0, and `offset` is the locked value.
     """
 
     kind: str
@@ -158,7 +159,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        # MuJoCo requires limits of a prismatic joint, but its kinematics ignores the limits.
+        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element

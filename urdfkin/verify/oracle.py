@@ -353,9 +353,10 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Names of a joint's coordinates, by the joint's number of velocities (planar joint: 3, floating joint: 6).
+#: Maps a joint's number of joint velocities to the suffixes of the joint's coordinate names.
+#: A planar joint has three joint velocities, and a floating joint has six.
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
-#: Names of a joint's velocities, by the joint's number of velocities (planar joint: 3, floating joint: 6).
+#: Maps a joint's number of joint velocities to the suffixes of the joint's velocity names.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
@@ -421,12 +422,12 @@ class QueryBatch(NamedTuple):
     """The arguments that an oracle receives for n configurations.
 
     `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `frames_are_joints` is True,
-    `frames` contains `JointFrame` objects. Pinocchio then computes Jacobians and J-dot with the functions for
-    joints instead of the functions for frames.
+    `frames` contains `JointFrame` objects. In this case, Pinocchio computes Jacobians and J-dot with the
+    functions for joints, not with the functions for frames.
 
-    If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
-    frame may round differently from its function for several frames. Therefore, Pinocchio uses the function
-    for several frames even if `frames` contains one frame.
+    Pinocchio's function for a single frame may round differently from Pinocchio's function for several
+    frames. If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio then uses the
+    function for several frames, even if `frames` contains one frame.
     """
 
     frames: Sequence[str]
@@ -450,7 +451,7 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The user's arguments of one call, which `select` converts for an oracle.
+    """The user's arguments of one call. The method `select` converts the arguments for an oracle.
 
     `named_inputs` has an entry for each input: the user's text or mapping with names, or None for an array.
     `joints` lists the name and the number of joint velocities of each joint that has coordinates.
@@ -471,7 +472,10 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def convert_inputs(self) -> None:
-        """Convert the inputs before the computation writes to `out`, which may share memory with an input."""
+        """Convert the inputs before the computation writes to `out`.
+
+        The array `out` may share memory with an input.
+        """
         _ = self._inputs
 
     @cached_property
@@ -557,9 +561,10 @@ class Oracle:
     A subclass builds the library's model in `__init__`. An oracle takes only names and sizes from `tree`, no
     geometry. Results have the shape (n, frames, ...).
 
-    `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
-    that the tree contains and the text does not contain. `lock` contains the values (rad or m) of locked
-    joints. `new_data` returns a new data structure of the library, for one thread.
+    `moving_base` connects the world and the root by a free-flyer. The user can add a root joint that the URDF
+    text does not contain. `root_joint` is the kind of this joint: "floating", "planar", or None for no root
+    joint. `lock` contains the values (rad or m) of locked joints. `new_data` returns a new data structure of
+    the library, for one thread.
 
     Raises OracleError if the library does not accept the text, or if the library's joints differ from the
     joints of `tree`.

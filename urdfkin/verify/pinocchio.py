@@ -9,8 +9,8 @@ The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF t
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
 if their mimic joints are enabled. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules
-define a matrix G and a vector g_0. Then q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full"
-marks Pinocchio's vectors, which contain numbers for the mimic joints too.
+define a matrix G and a vector g_0. Then q_full = G q + g_0, v_full = G v and J = J_full G. Pinocchio's
+vectors also contain numbers for the mimic joints. The suffix "full" marks these vectors.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: Tests confirm urdfkin's definitions of accelerations and J-dot only for these versions of Pinocchio.
+#: urdfkin needs the versions of Pinocchio for which tests confirm the definitions of accelerations and J-dot.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -139,8 +139,8 @@ def build_model(
     Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
     is therefore rejected. A long chain of links is parsed with a larger stack.
 
-    `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
-    With `lock_mimic_joints`, the joints that mimic a locked joint are also locked.
+    `root_joint` is "floating", "planar", or None for a fixed root. The values in `lock` are in rad or m. If
+    `lock_mimic_joints` is True, the joints that mimic a locked joint are also locked.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -335,9 +335,9 @@ class PinocchioOracle(Oracle):
 
         - The returned NumPy array has C order, but the numbers are in Eigen's order: the first index varies
           fastest.
-        - In LOCAL, entries [i, j] of two velocities i and j of the same joint may differ from 0. The true
-          value is 0, because the joint's own motion does not change the joint's axes in the frame's
-          coordinates.
+        - In LOCAL, Pinocchio may return a nonzero entry [i, j] for two velocities i and j of the same joint.
+          The true value is 0, because a joint's motion does not change the joint's own Jacobian columns in
+          the axes of the frame.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
@@ -399,8 +399,8 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
 
-    If `memory` has fewer than n rows, each block overwrites the previous block. Empty results are not
-    computed, because Pinocchio 4.1 crashes the process for a Jacobian without columns.
+    If `memory` has fewer than n rows, later blocks overwrite earlier blocks in `memory`. Empty results are
+    not computed, because Pinocchio 4.1 crashes the process for a Jacobian without columns.
     """
     if 0 in memory.shape:
         yield memory

@@ -57,18 +57,21 @@ class Quantity:
         ask_oracle: Function (oracle, query) that returns the oracle's results (n, frames, ...).
         blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
         scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
-        factors: Largest number of factors in a term of the quantity, for LOCAL_WORLD_ALIGNED
-            (`urdfkin.verify.bounds`).
+        factors: Each number of a result is a sum of terms, and each term is a product of rotated vectors, the
+            factors. `factors` is the largest number of factors in a term for LOCAL_WORLD_ALIGNED.
         results_and_bound: Function (oracle, part, ours, library) that returns the oracle's results and the
             bound. If `results_and_bound` is not None, the checks use `results_and_bound` instead of
             `ask_oracle` and `scale`.
-        compute_intervals: Function (motion, link, reference) that returns intervals around the true values.
-        recursive: True if the forward recursion computes the quantity for any list of frames.
+        compute_intervals: Function (motion, link, reference) that returns intervals. Each interval contains
+            the true value of one number of the result.
+        recursive: True if the forward recursion computes the quantity from `inputs`, without other arguments
+            such as gravity.
         in_validation: True if `validate`, the accuracy study and plots include the quantity. The Hessian is
             not included, because a Hessian has nv times as many numbers as a Jacobian.
         has_reference: True if the quantity depends on a reference frame.
-        object_kind: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
-        heading: Heading of the column in reports; several quantities may share a column.
+        object_kind: A validation compares the quantity for each object of this kind: "frames", "joints" or
+            "columns".
+        heading: Heading of the quantity's column in reports; several quantities may have the same column.
         help_text: Help text of the command, without the summary.
     """
 

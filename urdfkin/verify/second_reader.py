@@ -5,7 +5,7 @@ axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
 yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
 normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
-returns None, which counts as the default value of the URDF specification.
+returns None. The comparison replaces None by the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
 #: A sine and a cosine have an error of one eps each.
-#: The values of two products and one sum are at most 1, so each has an error of at most half an eps.
+#: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference of a component of an axis that two programs normalise.
 #: The length has an error of 2 eps, and the quotient is rounded once.
@@ -128,7 +128,7 @@ def _compare_joints(
     """Yield two texts for each difference between urdfkin's joint and yourdfpy's joint.
 
     The first text describes the difference. The second text names a known fault of yourdfpy that explains the
-    difference; the second text is empty if the function finds no such fault.
+    difference. If no known fault explains the difference, the second text is empty.
     """
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
@@ -155,7 +155,7 @@ def _compare_joints(
 
 
 def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
-    """Return yourdfpy's limit, with the specification's default for a missing number."""
+    """Return yourdfpy's limit; the default value of the URDF specification replaces a missing number."""
     if joint.limit is None:
         return None
     bounded = joint.type in _BOUNDED_KINDS

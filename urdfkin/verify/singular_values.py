@@ -182,7 +182,7 @@ class SingularValues(Displayable):
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
         manipulability is the product of all singular values. The product rule gives the derivative of this
         product without a division by a singular value. The gradient is NaN if the smallest singular value may
-        be 0, because the manipulability may then not be differentiable.
+        be 0. If the smallest singular value is 0, the manipulability may not be differentiable.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -253,7 +253,7 @@ def _orthogonality_error(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix that contains inf is not scaled; its norm is inf.
+    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

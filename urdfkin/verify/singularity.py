@@ -5,11 +5,11 @@
 - Minimal dependent set: linearly dependent columns that become independent if any column is removed. The
   joints of such columns cause the loss of rank.
 
-A geometric reason, such as parallel axes, is stated only if the columns satisfy the geometric condition, up
-to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis.
-The vector a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
-their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
-is 0.
+The module states a geometric reason, such as parallel axes, only if the columns satisfy the geometric
+condition within the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction
+of the axis. The vector a leads from the frame's origin to a point of the axis. Two joint axes are therefore
+collinear if their columns are equal up to sign. An axis passes through the frame's origin if the linear part
+of the column is 0.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from urdfkin.errors.display import Displayable, TextDocument, format_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: The search finds minimal sets of linearly dependent columns, with up to this number of columns.
+#: The search finds minimal sets of at most `_MAX_SET_SIZE` linearly dependent columns.
 _MAX_SET_SIZE = 4
-#: The search is skipped for a Jacobian with more columns than this number.
+#: The search is skipped for a Jacobian with more than `_MAX_COLUMNS` columns.
 _MAX_COLUMNS = 16
 #: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
@@ -37,7 +37,7 @@ _NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FrameJacobian:
-    """A robot's Jacobian, with the names of its frame and of its joints.
+    """A robot's Jacobian, with the names of the frame and of the joints.
 
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
@@ -46,8 +46,9 @@ class FrameJacobian:
             value is None if the column does not belong to a single joint axis.
         active_entries: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
-            `sample_jacobians`, which have a fixed base.
+        moving_base: True if the caller gave the motion of a moving base. `sample_jacobians` uses a fixed
+            base. For a moving base, the directions that are lost at random configurations are therefore
+            unknown.
     """
 
     J: FloatArray
@@ -78,8 +79,9 @@ class Singularity(Displayable):
         rank: Number of singular values with a lower bound above 0.
         full_rank: Largest possible rank: the smaller of the numbers of rows and columns.
         smallest_value_bound: Upper bound on the smallest singular value.
-        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty
-            if the Jacobian has more rows than columns.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. If the
+            frame never moves in some directions that depend on q or on a moving base, urdfkin cannot
+            determine the lost directions. The array is then empty.
         null_motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons of the loss.
 
@@ -147,8 +149,8 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # If the arm has fewer joints than the Jacobian has rows, some directions have no motion at any q.
-        # These directions can depend on q, and the lost directions are then unknown.
+        # If the Jacobian has more rows than columns, the frame never moves in some directions.
+        # If these directions depend on q, the directions that only this configuration loses are unknown.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -166,7 +168,10 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Return the rank at random configurations, and a basis of the directions lost in all of them."""
+        """Return the largest rank at random configurations, and a basis of directions.
+
+        The frame cannot move in any of these directions at any of the random configurations.
+        """
         samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))

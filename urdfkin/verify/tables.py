@@ -1,4 +1,4 @@
-"""Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
+"""Compare the placement, Jacobian and acceleration of a Denavit-Hartenberg table's tip with Pinocchio.
 
 Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The base
 may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
@@ -14,13 +14,13 @@ results come from `urdfkin.kinematics.equations`, so this module implements the 
 
 The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
 that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
-effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
-the sum of two path lengths. One path leads from the root to the table's base, the other path from the root to
-the tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than
-the reach, the bound uses this sum instead of the reach. The bound uses at most `MAX_LENGTH_RATIO` times the
-reach. In a table with Hayati rows, no single length exceeds this limit. A coordinate can move several joints
-by mimic rules. The bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these
-joints.
+effect of the rounded angles. The bound on rounding errors is proportional to a length, usually the robot's
+reach. The reach is the sum of two path lengths. One path leads from the root to the table's base, the other
+path from the root to the tip. Both lengths include prismatic displacements. If the sum of all lengths in the
+table is larger than the reach, the bound uses the sum instead of the reach. A sum above `MAX_LENGTH_RATIO`
+times the reach is reduced to this limit. In a table with Hayati rows, no single length is larger than
+`MAX_LENGTH_RATIO` times the reach. A coordinate can move several joints by mimic rules. The bound on a
+Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -73,11 +73,12 @@ class TableCheck:
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
             quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
-        bound_ratios: Ratio of the difference to its bound for "placement", "jacobian" and "acceleration". A
-            ratio above 1 is a disagreement, unless `loss` explains the difference.
-        has_snapping: Whether snapping changed the table. The bound then includes the effect of snapping.
-        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
-            difference. In all other cases, `loss` is None.
+        bound_ratios: Ratios of difference to bound for "placement", "jacobian" and "acceleration". A ratio
+            above 1 is a disagreement, unless `loss` explains the difference.
+        has_snapping: True if snapping changed the table. In this case, the bound includes the effect of
+            snapping.
+        loss: If very large lengths in the table cause a difference above the bound, `loss` is a text that
+            explains the difference. Otherwise, `loss` is None.
     """
 
     samples: int
@@ -170,9 +171,9 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Each quantity has a pair of numbers for linear differences, and a pair for angular differences.
-    #: The bound is the first number times the relative rounding error, plus the second number.
-    #: The second number of a pair is the effect of snapping.
+    #: Each quantity has one pair of numbers for linear differences, and one pair for angular differences.
+    #: The first number of a pair is the scale of rounding errors; the second is the effect of snapping.
+    #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
@@ -240,7 +241,7 @@ class ErrorScales:
         reach: (n,) sum of two path lengths, m: from the root to the table's base, and from the root to the
             table's tip. Large lengths in the table increase `reach`, as the module's docstring describes.
         turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
-            Only joints from the root to the table's base or tip count.
+            The sum includes only the joints on the paths from the root to the table's base and tip.
         sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
         rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly
@@ -292,7 +293,7 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
 
 
 class _SnapEffect:
-    """Largest effect of snapping (rounding the table's angles) on the quantities of a table.
+    """Bounds on the changes of a table's quantities by snapping, which rounds the table's angles.
 
     Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
     vector z x d therefore changes by at most turn * reach + 2 * metres. A product of two such vectors changes
@@ -310,5 +311,8 @@ class _SnapEffect:
 
 
 def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest absolute values of the linear and of the angular rows of (n, 6, ...)."""
+    """Return the largest absolute values in the three linear rows, and in the three angular rows.
+
+    `six` has the shape (n, 6, ...), and both results have the shape (n, ...).
+    """
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

@@ -3,14 +3,15 @@
 Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
 from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
-- with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
-  of freedom and limits for each joint. A difference raises OracleError.
-- with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
-  robot in one configuration. In this configuration, each link must have the placement of the link's prim. The
-  file states the prims' transforms separately from the joint frames. A difference means that the file
-  contradicts itself; `load` reports the difference as a warning.
+- OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin's parser must find the same bodies,
+  frames, degrees of freedom and limits for each joint. A difference raises OracleError.
+- OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The stage shows the robot in
+  one configuration. In this configuration, each link must have the placement of the link's prim. The file
+  states the prims' transforms separately from the joint frames. A difference means that the joint frames
+  contradict the prims' transforms; `load` reports the difference as a warning.
 
-Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
+A stage stores numbers in single precision. Both comparisons allow only differences that rounding to single
+precision can cause.
 """
 
 from __future__ import annotations
@@ -40,12 +41,13 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF`.
-#: `_check_joint` derives this bound.
+#: The joint frames of OpenUSD's parser and of urdfkin may differ by an angle (rad).
+#: The angle is at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
-#: Number of rounding errors in a joint's origin (derived in `_check_joint`).
+#: Number of rounding errors in a joint's origin; `_check_joint` derives this number.
 _ORIGIN_ROUNDINGS = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE_ROUNDOFF`.
+#: A prim's transform consists of operations, such as rotations.
+#: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.
 #: `_compare_prims` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
@@ -163,14 +165,14 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers for each joint name, which bound the effect of rounding to single precision.
+#: Maps each joint's name to five numbers that describe the joint's rounding errors in single precision.
 #: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SinglePrecisionErrors:
-    """Bounds on the effect of rounding to single precision on the links and the joints of a robot.
+    """Bounds on the errors that rounding to single precision causes in a robot's links and joints.
 
     Attributes:
         links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
@@ -185,7 +187,7 @@ class SinglePrecisionErrors:
 
 
 def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> SinglePrecisionErrors:
-    """Return the largest errors of links and joints that result from rounding to single precision.
+    """Return bounds on the errors that rounding to single precision causes in links and joints.
 
     The error of a stored number is at most half the distance to the next number in single precision; 0 has no
     error.
@@ -204,9 +206,9 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
     error of A B^-1 is at most e, and the position error of A B^-1 is at most w + e |p|.
 
     - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
-      the revolute joint. In `single`, the numbers of the revolute joint include the errors of B. The fixed
-      joint therefore has no numbers in `single`.
-    - Other joints: `single` contains |p| as the last of five numbers.
+      the revolute joint. The mapping `single` adds the errors of B to the errors of the revolute joint, and
+      has no entry for the fixed joint.
+    - Other joints: the last of the joint's five numbers in `single` is |p|.
     - Locked prismatic joint: the value q also displaces the child link. |q| is at most the length of the
       joint's constant offset plus the lengths of the two origins.
     - Joint without an entry in `single`: no rounding errors.
@@ -236,9 +238,9 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
-    The bound assumes that a prim's transform consists of several operations: one operation for each joint on
-    the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at
-    most `_TRANSFORM_ROUNDINGS` u, the largest of these three values:
+    The bound assumes that a prim's transform consists of n + 1 operations, where n is the number of joints on
+    the path from the root. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at most
+    `_TRANSFORM_ROUNDINGS` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component of this vector perpendicular

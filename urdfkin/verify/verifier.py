@@ -73,8 +73,9 @@ class Verifier:
 
     `known_refusal` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the
     library that checks the results of the robot's methods. Pinocchio always checks tables, the accuracy study
-    and enclosures, even if `oracle` is another library. If the source is not a URDF, `source_notes` is a text
-    about the conversion to URDF and its check; otherwise `source_notes` is empty.
+    and enclosures, even if `oracle` is another library. If the source has another format than URDF,
+    `source_notes` is a text about the conversion to URDF and the check of this conversion. For a URDF,
+    `source_notes` is empty.
     """
 
     def __init__(
@@ -100,7 +101,10 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer."""
+        """Return the oracle for the robot.
+
+        The first call builds the oracle's model. If `base` is not None, the model contains a free-flyer.
+        """
         key = library.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = library.make_oracle(
@@ -142,7 +146,7 @@ class Verifier:
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return the reason why an oracle cannot check this robot; None if it can."""
+        """Return the reason why an oracle cannot check this robot; None: the oracle can check the robot."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
@@ -218,11 +222,11 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that computes one configuration, and checks and records the result.
+        """Return a function that computes a quantity of one configuration, and checks and records the result.
 
-        The last argument of `compute` is `out`. `compute` returns None for arguments that `compute` does not
-        support. The returned function then also returns None. If the oracle cannot check the robot, the
-        returned function always returns None.
+        The returned function has the same arguments as `compute`. The last argument is `out`. If `compute`
+        does not support the arguments, `compute` and the returned function return None. If the oracle cannot
+        check the robot, the returned function always returns None.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -400,8 +404,8 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound on the difference between urdfkin's results and the oracle's.
 
-    The length of a path without prismatic joints is the same in every configuration. If the base is fixed, a
-    placement or a Jacobian then has the same bound in every configuration.
+    The bound of a placement or a Jacobian depends on the lengths of paths. If the base is fixed and all
+    joints on the paths are revolute, the lengths and the bound are the same in every configuration.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
@@ -449,7 +453,9 @@ def as_verify(verify: object) -> Verify:
 
 
 def split_into_parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
+    """Yield the indices of the checked configurations in parts.
+
+    `numbers` is the number of values in the results of one configuration.
 
     The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
     """

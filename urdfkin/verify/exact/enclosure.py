@@ -47,8 +47,8 @@ _ENDS = np.vectorize(interval_ends, otypes=[float, float])
 class Enclosure:
     """Lower and upper bounds of the true value of each number in a result.
 
-    The arrays have the shape of the result of the `Robot` method. `urdfkin` and `pinocchio` are the computed
-    results; `pinocchio` is None if Pinocchio cannot compute the result.
+    Each array has the shape of the result of the `Robot` method that computes the quantity. `urdfkin` is
+    urdfkin's result. `pinocchio` is Pinocchio's result, or None if Pinocchio cannot compute the result.
     """
 
     quantity: str
@@ -59,10 +59,10 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`, which is 0 only if the true value is a double.
+        """The difference `upper - lower` of each interval.
 
-        If the true value is not a double, the width is at least the distance between two neighbouring
-        doubles.
+        The width is 0 only if the true value is a double. If the true value is not a double, the width is at
+        least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
@@ -98,8 +98,9 @@ class Enclosure:
 class Enclosures:
     """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
 
-    The quantities have the shapes and units of the results of `Robot`. `digits` is the number of decimal
-    digits of the interval arithmetic; the ends of the intervals are then rounded outward to doubles.
+    Each quantity has the shape and the unit of the result of the `Robot` method with the same name. `digits`
+    is the number of decimal digits of the interval arithmetic. After the computation, the ends of the
+    intervals are rounded outward to doubles.
     """
 
     frame: str

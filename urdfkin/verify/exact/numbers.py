@@ -51,10 +51,11 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joints: int) -> int:
-    """Return a number of digits for which intervals are narrower than the last digit of a double.
+    """Return the number of decimal digits of intervals for a path with `joints` joints.
 
-    Each joint on the path to the frame adds one digit. One digit allows for an interval that is ten times as
-    wide. A joint with an oblique axis makes the intervals only about twice as wide.
+    With this number of digits, an interval is narrower than the last digit of a double. The number of digits
+    increases by one for each joint on the path. One more digit makes an interval ten times narrower, and a
+    joint with an oblique axis makes an interval only about twice as wide.
     """
     return _BASE_DIGITS + joints
 
@@ -63,15 +64,15 @@ def enough_digits(joints: int) -> int:
 def precision(digits: int) -> Iterator[None]:
     """Set the number of decimal digits of intervals in a `with` block.
 
-    Arb has one precision for the whole process. A lock therefore allows only one thread at a time to run such
-    a block.
+    Arb has one precision for the whole process. While one thread runs such a block, a lock therefore makes
+    other threads wait.
     """
     with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
 
 
 def as_interval(value: Number) -> Number:
-    """Return a number or a decimal as an interval; a double or an integer becomes an interval of width 0."""
+    """Convert a number or a decimal to an interval; a double or an integer becomes an interval of width 0."""
     return arb(value)
 
 
@@ -94,9 +95,9 @@ def _round_outward(end: arb, towards: float) -> float:
 def format_decimal(x: Number, negligible: float) -> str | None:
     """Return an interval's midpoint as a decimal of 17 significant digits; None if the interval is too wide.
 
-    The radius must be at most 1e-20 times the midpoint. The decimal then differs from the true value by at
-    most 0.501 units of its last digit. An interval that contains 0 becomes 0 if its radius is at most 1e-10
-    times `negligible`.
+    The radius must be at most 1e-20 times the midpoint. The decimal therefore differs from the true value by
+    at most 0.501 units of the decimal's last digit. An interval that contains 0 becomes 0 if the interval's
+    radius is at most 1e-10 times `negligible`.
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
@@ -118,9 +119,10 @@ def format_decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Functions of one type of number, such as intervals: conversion, sine and cosine, and square root.
+    """Arithmetic functions for one kind of numbers, such as intervals.
 
-    `number` converts a double, or a decimal as text, to this type of number.
+    `number` converts a double, or a decimal given as text, to a number of this kind, for example to an
+    interval.
     """
 
     number: Callable[[str | float], Number]
@@ -168,9 +170,9 @@ def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (1 + E) has the same orthogonal factor U as M, and E is symmetric, so X^T X - 1 = 2 E + E^2. The
-    eigenvalues of E are above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is
-    added to the radius of each interval.
+    (I + E) has the same orthogonal factor U as M. E is symmetric, so X^T X - I = 2 E + E^2. The eigenvalues
+    of E are above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - I|. This bound is added to the
+    radius of each interval.
     """
     with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
@@ -228,6 +230,7 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
+# The cache avoids parsing the same URDF twice.
 # Parsing a large URDF is slower than computing the intervals of one sample.
 @lru_cache(maxsize=1)
 class _ExactText:

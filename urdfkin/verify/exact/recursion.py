@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
-The inputs are the URDF's decimals and the exact values of q, v and a. The equations are those of
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The results serve to measure rounding
-errors; the equations are checked by comparison with Pinocchio.
+The inputs are the URDF's decimals and the exact values of q, v and a. The equations come from
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure rounding errors. The
+comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def make_base_state(base: BaseNumbers) -> LinkState:
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
-    """Position, velocity, acceleration and Jacobian columns of each link in one sample, by link index."""
+    """Motion and Jacobian columns of the links in one sample; the keys are link indices."""
 
     states: Mapping[int, LinkState]
     columns: Mapping[int, tuple[Column, ...]]
