@@ -10,9 +10,11 @@ import urdfkin
 from tests.laws.subjects import state
 from tests.laws.test_imu import moving_base
 from tests.verify.test_singular_values import ROWS, SLIDE
+from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
+from urdfkin.robot.trajectory import Trajectory
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 N = 7
@@ -100,3 +102,14 @@ def test_a_motion_of_two_arrays_is_refused() -> None:
     robot = urdfkin.load("ur5")
     with pytest.raises(urdfkin.InputError, match="a trajectory, or q, v and a: found 2 arrays"):
         urdfkin.frame_motion(robot, (np.zeros((1, 6)), np.zeros((1, 6))), "tool0")
+
+
+def test_in_world_the_manipulability_includes_a_joint_that_only_a_displaced_base_moves_away() -> None:
+    robot = urdfkin.load("planar_two_link")
+    q, still, placement = np.array([[0.3, 1.0]]), np.zeros((1, 2)), np.eye(4)
+    placement[:3, 3] = 0.0, 1.0, 0.0
+    motion = Trajectory(np.zeros(1), q, still, still, "given", base=BaseMotion(placement))
+    x = frame_motion(robot, motion, "tip", "world")
+    J = x.jacobian[0, :2]
+    assert x.manipulability(slice(0, 3)) == pytest.approx([abs(np.linalg.det(J))], rel=1e-12)
+    assert abs(np.linalg.det(J)) > 0.1

@@ -139,6 +139,18 @@ def test_columns_that_the_bound_treats_as_zero_are_zero_in_the_jacobian(
     assert (np.abs(J).max(axis=(0, 1))[found[0].any(axis=0)] > 0.0).all()
 
 
+@pytest.mark.parametrize("x", [0.0, 1.0])
+def test_in_world_a_displaced_root_gives_each_revolute_joint_a_linear_velocity(x: float) -> None:
+    robot = urdfkin.load(ARM)
+    plan = robot.plan([robot.tree.frame_link("l3")])
+    found = bounds.find_active_entries(plan, WORLD, root_at_origin=x == 0.0)
+    assert found[0, :3].tolist() == [[x != 0.0, True]] * 3
+    base = np.eye(4)
+    base[0, 3] = x
+    J = robot.jacobian(robot.sample(20, 1) + 0.01, "l3", WORLD, base=urdfkin.BaseMotion(base))
+    assert (found[0] | (J == 0.0)).all()
+
+
 def test_the_bound_of_euler_rates_grows_with_the_inverse_square_of_the_singularity_distance(
     plan: CompiledTree,
 ) -> None:

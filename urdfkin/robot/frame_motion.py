@@ -186,6 +186,7 @@ def frame_motion(
         row: call.compute(row.compute_results, call.plan, inputs, reference, base=state)
         for row in validated_quantities()
     }
+    at_origin = base is None or not base.placement[..., :3, 3].any()
     reason = robot.verifier.find_refusal(call.base)
     placement, velocity, acceleration, jacobian = (
         ours[row][:, 0] for row in (PLACEMENT, VELOCITY, ACCELERATION, JACOBIAN)
@@ -197,7 +198,7 @@ def frame_motion(
         velocity,
         acceleration,
         jacobian,
-        find_active_entries(call.plan, reference)[0],
+        find_active_entries(call.plan, reference, root_at_origin=at_origin)[0],
         call.compute(acceleration_breakdown, robot.tree, call.links[0], *inputs, reference, state),
         {} if reason else {row.name: _check(row, robot, call, results) for row, results in ours.items()},
         reason,

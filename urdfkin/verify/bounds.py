@@ -675,15 +675,17 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     return weights[0], weights[1]
 
 
-def find_active_entries(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
+def find_active_entries(
+    plan: CompiledTree, reference: Reference = _ALIGNED, *, root_at_origin: bool = True
+) -> NDArray[np.bool_]:
     """Return a bool array (frames, 6, nv) that is False for Jacobian entries that are always 0.
 
-    For LOCAL and LOCAL_WORLD_ALIGNED, a False entry is 0 for every q and every motion of the base. For WORLD,
-    a False entry is 0 for every q if the root is at the world origin.
+    A False entry is 0 for every q. In LOCAL and LOCAL_WORLD_ALIGNED, it is also 0 for every motion of the
+    base. `root_at_origin` states whether the root link is at the world's origin; only WORLD uses this.
 
-    The linear rows of a revolute joint's column are z x d. In WORLD, d leads from the joint to the root. In
-    the other reference frames, d leads from the joint to the frame. The vector d is 0 for every q if all
-    lengths between the ends of d are 0, and no joint between the ends translates.
+    The linear rows of a revolute joint's column are z x d. In WORLD, d leads from the joint to the world's
+    origin. In the other reference frames, d leads from the joint to the frame. The vector d is 0 for every q
+    if all lengths between the ends of d are 0, and no joint between the ends translates.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
@@ -695,7 +697,7 @@ def find_active_entries(plan: CompiledTree, reference: Reference = _ALIGNED) -> 
             path.append(step)
             step = int(plan.parents[step])
         if reference.at_world:
-            levers = np.logical_or.accumulate(extends[path[::-1]])[::-1]
+            levers = np.logical_or.accumulate([not root_at_origin, *extends[path[::-1]]])[:0:-1]
         else:
             levers = np.logical_or.accumulate([plan.lengths[len(turns) + f] > 0.0, *extends[path[:-1]]])
         has_lever = dict(zip(path, levers, strict=False))
