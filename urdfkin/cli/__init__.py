@@ -109,7 +109,8 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Commands that error messages suggest. Each value lists the words for which urdfkin suggests the key.
+#: Suggestions for a word that is not a command, for example `placement` for the word "fk".
+#: Each key is the suggested command, and its value lists the words.
 _SYNONYMS = _by_word(
     {
         "--help": "help usage man",
@@ -138,8 +139,8 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for computations that urdfkin does not offer.
-#: Each value lists the words for which urdfkin prints the key, a text with advice.
+#: Advice for a word that names a computation without a command, for example "ik".
+#: Each key is the advice that urdfkin prints, and its value lists the words.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm. For an"

@@ -1,4 +1,7 @@
-"""Show the progress of a validation; define the commands `urdfkin report status` and `report merge`."""
+"""Show the progress of a validation.
+
+This module also defines the commands `urdfkin report status` and `urdfkin report merge`.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,8 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Minimum time (s) between two lines of text, and between two lines of JSON
+#: Minimum time (s) between two lines about the progress.
+#: `_LINE_INTERVAL` is for lines of text, and `_JSON_INTERVAL` is for lines of JSON.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
 

@@ -460,10 +460,10 @@ class CheckRun:
         self.outcome.add(file, Examination(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
-        """Return whether a file, and each file that it may include, is the same as in `version`.
+        """Return whether a file and its included files are the same as in the commit `version`.
 
-        Every file of `version` with a suffix in `suffixes` is treated as an included file. A deleted file is
-        also treated as an included file if the name of the deleted file occurs in the text.
+        Every file of the commit with a suffix in `suffixes` counts as an included file. A file that was
+        deleted after the commit also counts if the deleted file's name occurs in the checked file.
         """
         if suffixes not in self._has_changes:
             self._has_changes[suffixes] = version.has_changes(suffixes)

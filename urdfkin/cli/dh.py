@@ -155,10 +155,12 @@ form_options = combine(
 )
 
 
-#: Options that the published table of --like determines.
+#: Options that cannot be combined with --like.
+#: With --like, a published table determines the values of these options.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: If ROBOT is a Denavit-Hartenberg table, the command derives a new table only with one of these options.
+#: Options that affect the rows of the table.
+#: If ROBOT is a Denavit-Hartenberg table, each of these options makes the command derive a new table.
 _DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

@@ -64,10 +64,10 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 @dataclass(frozen=True, slots=True)
 class DHRequest:
-    """The options of `urdfkin dh`; `choices` are arguments of `Robot.dh`.
+    """The values of the options of `urdfkin dh`.
 
-    `unchanged` is the table file if ROBOT is a table file and no option changes the rows. Otherwise,
-    `unchanged` is None.
+    `choices` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged` is the table
+    file if ROBOT is a table file and no option changes the rows. Otherwise, `unchanged` is None.
     """
 
     robot: Robot

@@ -30,20 +30,24 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, default: int) -> int:
-        """Return 128 + the number of the signal that stopped the command, as shells do.
+        """Return the exit code of a command that a signal may have stopped.
 
-        Return `default` if no signal stopped the command, or if `default` is 1 (a disagreement).
+        `default` is the exit code without a signal. After signal n, the exit code is 128 + n, as in shells. A
+        disagreement (`default` is 1) is more important than a signal: the exit code stays 1.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
 
 
 @contextmanager
 def handle_signals() -> Iterator[Stop]:
-    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
+    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP.
+
+    Later signals are ignored, so that finished results are saved.
+    """
     stop = Stop()
     # `nohup` makes a process ignore SIGHUP.
-    # With a new handler, SIGHUP would stop the process.
-    # The new handler therefore replaces only default handlers.
+    # If urdfkin set a handler for SIGHUP in such a process, SIGHUP would stop the process.
+    # urdfkin therefore sets a handler only for signals that still have the default handler.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:

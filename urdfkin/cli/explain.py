@@ -21,12 +21,20 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Map the anchor of each heading in docs/questions.md to the section, with links removed."""
+    """Return the sections of docs/questions.md, by the anchor of each section's heading.
+
+    Each link in a section is replaced by the text of the link.
+    """
     return {make_anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def find_answer(topic: str) -> str | None:
-    """Return the section with the anchor `topic`, or the only one whose anchor has all words of `topic`."""
+    """Return the section of docs/questions.md about a topic.
+
+    The function first searches for the section with the anchor `topic`. If there is none, the function
+    searches for sections whose anchors contain all words of `topic`. Return None if the second search finds
+    no section or several sections.
+    """
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
@@ -52,7 +60,10 @@ def make_anchor(heading: str) -> str:
 
 
 def _sections() -> list[str]:
-    """Split docs/questions.md at its headings; the first section has the setup code of all examples."""
+    """Split docs/questions.md at its headings.
+
+    The first section has the setup code of all examples.
+    """
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
@@ -68,9 +79,9 @@ def explain_command(topic: str | None) -> None:
     CODE is a finding's code or its short name. The page of a finding has the reason, a bad and a good
     example, and the behaviour of other programs. EQUATION is the number of an equation in the textbook, such
     as 7.130. The page of an equation has the equation, the function that implements the equation, and the
-    check of this function. QUESTION is the name of a question, or a word of the name. With another WORD, such
-    as jacobian, the command lists the codes and equations whose description contains the word. Without an
-    argument, the command lists all codes, sections with equations, and questions.
+    check of this function. QUESTION is the name of a question, or a word of the name. WORD is any other word,
+    such as jacobian. For WORD, the command lists the codes and equations whose description contains the word.
+    Without an argument, the command lists all codes, sections with equations, and questions.
 
     \b
     Example:

@@ -154,7 +154,8 @@ _EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
-    A library in any language compares its results with these test vectors; docs/vectors.md explains how.
+    A library in any language can compare its results with these test vectors. docs/vectors.md explains the
+    comparison.
     """
 
 
@@ -181,10 +182,10 @@ def vectors_command() -> None:
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, the command writes
-    test vectors of the robots of the catalogue and of some 70 small robots. Each small robot tests one
-    feature of URDF. Each robot has a JSON file, and a text file with the same numbers, separated by tabs. The
-    file SHA256SUMS has the digests of all files.
+    If you name one or more robots, the command writes only the test vectors of the named robots. If you name
+    no robot, the command writes test vectors of the robots of the catalogue and of some 70 small robots. Each
+    small robot tests one feature of URDF. Each robot has a JSON file, and a text file with the same numbers,
+    separated by tabs. The file SHA256SUMS has the digests of all files.
 
     The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
     spatial acceleration. The files contain the placement once, and each other quantity in the reference

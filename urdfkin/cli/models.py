@@ -105,25 +105,28 @@ def same_command(
     recheck: Path | None,
     **paths: Path | None,
 ) -> Answer:
-    """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
+    """Prove whether A and B are the same robot in every configuration.
 
-    A and B are paths, names that `urdfkin robots` lists, or Denavit-Hartenberg tables. A and B are the same
-    robot if the screws of all joints and the zero-configuration poses of all links agree. Fixed links, names
-    and the order of joints may differ. A and B are equivalent if they agree after a change of B. Examples of
-    a change are another base pose of B, or another zero position of a joint of B.
+    If you name more than two robots, the command compares each pair. A and B are paths, names that `urdfkin
+    robots` lists, or Denavit-Hartenberg tables. A and B are the same robot if the screws of all joints and
+    the zero-configuration poses of all links agree. Fixed links, names and the order of joints may differ. A
+    and B are equivalent if some changes of B make B the same robot as A. For example, B may need another base
+    pose, or another zero position of a joint.
 
-    If A and B differ, the command prints two bounds on the largest distance of each frame of B from the same
-    frame of A. The command also prints a configuration in which the distance is at least the lower bound. No
-    configuration within the joint limits exceeds the upper bound: this is proven. A USD file has numbers in
-    single precision. Two models are the same up to single precision if each joint differs by no more than the
-    rounding of its numbers to single precision.
+    If A and B differ, the command compares each frame of B with the same frame of A. For the largest distance
+    between the two frames, the command prints a lower and an upper bound. The command also prints a
+    configuration in which the distance is at least the lower bound. The upper bound is proven for all
+    configurations within the joint limits.
+
+    The numbers of a USD file are rounded to single precision. If no joint differs by more than this rounding
+    can cause, A and B are the same up to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
-    equivalent only after changes of B. The same applies to models with differences without effect on motion,
-    for example of limits, joint types or links. With --within, the command does not change B before the
-    comparison. Exit 0: every frame is proven to be within the given distance. 1: the proof fails for at least
-    one frame.
+    equivalent only after changes of B. Some differences have no effect on motion, for example different
+    limits, joint types or links. With --strict, the exit code is also 1 for such differences. With --within,
+    the command does not change B before the comparison. Exit 0: every frame is proven to be within the given
+    distance. 1: the proof fails for at least one frame.
     """
     from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate
@@ -208,13 +211,13 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @source_options
 @answer_command()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
-    """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
+    """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
-    For each changed joint, the command prints the largest displacement of any frame by this joint's changes.
-    This distance is the maximum over all configurations within limits, with the same joint coordinates in OLD
-    and NEW. The last line of the output states how far all changes together move the frames. If OLD and
-    NEW have different formats (URDF, MJCF or USD), the changes are the differences that `urdfkin same` finds.
-    With C, all pairs are compared.
+    For each changed joint, the command prints the frame that the changes of this joint move farthest. The
+    printed distance is the largest distance in all configurations within the joint limits. OLD and NEW have
+    the same joint coordinates in each configuration. The last line of the output states how far all changes
+    together move the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the changes are the
+    differences that `urdfkin same` finds. If you name more than two robots, the command compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

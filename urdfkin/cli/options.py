@@ -58,9 +58,10 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 def format_from_suffix(
     context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], default_format: str
 ) -> str:
-    """Return the output format; raise InputError if --format contradicts the suffix of the output file.
+    """Return the output format that --format or the suffix of the output file selects.
 
-    `formats` lists the formats of each suffix, the default first: `{".py": ("numpy", "sympy")}`.
+    Raise InputError if --format contradicts the suffix. `formats` lists the formats of each suffix, the
+    default first: `{".py": ("numpy", "sympy")}`.
     """
     format_: str = context.params["format_"]
     if output is None:
@@ -101,7 +102,8 @@ def reject_unused_options(context: click.Context, unused: Collection[str], becau
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples that the value `random` draws; `random:N` draws N samples.
+#: Number of samples that an option with the value `random` draws, for example `--q random`.
+#: With the value `random:N`, the option draws N samples.
 _RANDOM_SAMPLES = 1
 
 
@@ -120,7 +122,7 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
     """Return a callback that stores an option's value for `load_options`.
 
-    With `always`, the callback also stores the value of an option that is not given.
+    If `always` is true, the callback stores a value even if the user does not give the option.
     """
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
@@ -423,7 +425,11 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that disable xacro or USD options if `source` has another format."""
+        """Return arguments of `load` for one of several sources.
+
+        If another source is a xacro file but `source` is not, the xacro options are disabled for `source`.
+        The same rule applies to USD files and USD options.
+        """
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -465,9 +471,10 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat the row of each array with one row, so that all arrays have the same number of rows.
+    """Return arrays with equal numbers of rows.
 
-    Raise InputError if an array has neither one row nor as many rows as the longest array.
+    The row of a one-row array is repeated until the array is as long as the longest array. Raise InputError
+    if any other array is shorter than the longest array.
     """
     import numpy as np
 
@@ -509,9 +516,10 @@ def _read_count(where: str, text: str) -> int:
 def read_batch(
     path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
-    """Read a CSV file with one sample per line; also return the layout that fits the number of columns.
+    """Read a CSV file with one sample per line.
 
-    Each layout is a list of column names. `units` is as in `read_columns`.
+    A layout is a list of column names. Also return the layout that fits the number of columns. `units` is as
+    in `read_columns`.
     """
     import numpy as np
 

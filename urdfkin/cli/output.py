@@ -83,7 +83,10 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the result in the format `form`, and whether the result includes the line `check`."""
+        """Return the output in the format `form`.
+
+        Also return True if the output already contains the line `check`, and False otherwise.
+        """
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -218,7 +221,10 @@ def certificate_exit_code(certificate: Certificate) -> int:
 
 
 def format_path_check(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output and the exit code; `check` is None if nothing was checked."""
+    """Return the line that states the result of Pinocchio's check, and the exit code of the command.
+
+    `check` is the result of the check, or None if nothing was checked.
+    """
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

@@ -255,7 +255,8 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first CSV column for samples without times, and for samples with times
+#: Headings of the first column of CSV output.
+#: The heading is "sample" if the samples have no times, and "t" if the samples have times.
 _TIME = ("sample", "t")
 
 
@@ -397,7 +398,10 @@ def placement_command(relative_to: str | None, form: str, verify: bool, **_: Any
 
 
 def _convert_poses(x: Inputs, T: FloatArray, form: str, *, verify: bool) -> FloatArray:
-    """Return each pose as six or seven numbers; with `verify`, Pinocchio checks the orientations."""
+    """Convert each pose to a position with three angles (six numbers) or a quaternion (seven numbers).
+
+    If `verify` is true and all earlier results are verified, Pinocchio checks the angles or quaternions.
+    """
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
@@ -452,10 +456,10 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row of the table belongs to one entry of v, for example a joint velocity. The row lists the time
-    derivatives of the frame's position and orientation (Euler angles or a quaternion). In the row
-    of an entry, this entry of v is 1, and all other entries of v are 0.
-    `urdfkin jacobian` prints angular velocities instead.
+    The table has one row for each entry of v, for example for each joint velocity. The row lists the time
+    derivatives of the frame's position and orientation (Euler angles or a quaternion). The row assumes that
+    this one entry of v is 1, and that all other entries of v are 0. `urdfkin jacobian` prints angular
+    velocities instead.
     """
     from urdfkin.kinematics.rotation import NEAREST
 
@@ -535,7 +539,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
     rounding errors of the decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of
     the singular values. The command also computes the derivative of the manipulability with respect to each
-    joint, from the Hessian.
+    joint. This derivative is computed from the frame's Hessian.
 
     At a singularity, the command prints the rank, the lost directions, and the joints that cause the
     singularity. The manipulability may have no derivative at a singularity. CSV then contains nan, and JSON

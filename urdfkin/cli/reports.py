@@ -41,7 +41,10 @@ report_options = combine(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write a report in the requested formats; return the exit code of the first failure, or 0."""
+    """Write a report in the requested formats, and return an exit code.
+
+    If a file cannot be written, the exit code is that of the first such error. Otherwise, the exit code is 0.
+    """
     codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
     return next(filter(None, codes), 0)
 
@@ -169,8 +172,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     If a model changed, the command lists the changes of each joint. A changed model alone is not a
     regression; `urdfkin same` and `urdfkin diff` compute how far the model's frames move.
 
-    Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because two numbers of
-    samples in the file contradict each other.
+    Exit 0: no regression. 1: a regression. 2: a file cannot be used. For example, the file states more
+    samples for a robot than the validation requested.
     """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document

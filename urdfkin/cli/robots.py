@@ -78,9 +78,9 @@ def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
     The joints have the same order as in q, in v and in the columns of a Jacobian. Pinocchio uses the same
-    order of the joints. The last line states whether the file has another order. Limits are in rad and rad/s,
-    for prismatic joints in m and m/s. A link that is not indented is a child of the link above it. If a link
-    has several children, lines before their names mark the children.
+    order of the joints. The last line compares this order with the order of the joints in the file. Limits
+    are in rad and rad/s, for prismatic joints in m and m/s. A link that is not indented is a child of the
+    link above it. If a link has several children, a branch of the drawn tree leads to each child.
     """
     loaded = load_robot(robot)
     data = {
@@ -165,9 +165,11 @@ def _orders(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return a text for each joint: its index in q, for example "7", or its range of indices, "7-13".
+    """Return a text with the indices of each joint.
 
-    The text is "7/6" if the index in v is 6. The text is "-" if the convention has no index for the joint.
+    The text is the joint's index in q, for example "7", or the range of the joint's indices, "7-13". If the
+    index in v differs, the text contains both: "7/6" means index 7 in q and index 6 in v. The text is "-" if
+    the convention has no index for the joint.
     """
     indices = conversion.q_and_v_indices
 

@@ -23,7 +23,8 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of a name without quotes, blanks and characters that a shell expands.
+#: Pattern of the names that completion offers.
+#: A shell does not interpret any character of these names.
 #: A name with a colon does not match, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
@@ -41,7 +42,8 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    # While the user types an option's value, click has not parsed ROBOT yet, so the first argument is used.
+    # While the user types the value of an option, click has not parsed ROBOT yet.
+    # In this case, the first argument of the command is taken as ROBOT.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 

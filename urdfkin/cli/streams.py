@@ -45,7 +45,10 @@ def flush_output() -> None:
 
 
 class _RawStream(io.FileIO):
-    """A standard stream; the first failure of stdout ends the command, and failures of stderr are ignored."""
+    """A standard stream that handles write errors.
+
+    The first write error on stdout ends the command. Write errors on stderr are ignored.
+    """
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)
@@ -114,7 +117,8 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of an unfinished line that is stored completely.
+#: Maximum number of characters of an unfinished line that a `SafeStream` stores completely.
+#: A longer line is stored only in part.
 #: A line is stored because the next piece of text may complete a CI command that begins in the line.
 _MAX_STORED = 64
 
@@ -168,7 +172,10 @@ class SafeStream:
         self.stream.write(text)
 
     def _without_commands(self, text: str) -> str:
-        """Escape CI commands in `text`, including a command that begins in an earlier text."""
+        """Escape CI commands in `text`.
+
+        The first characters of a command may have been written before `text`.
+        """
         first, *rest = text.split("\n")
         lines = [self._line_without_commands(first)]
         for line in rest:
@@ -180,7 +187,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Only the last 16 characters of a long line are stored; an "x" replaces the text before them.
+        # Of a long line, only the last 16 characters are stored.
+        # An "x" before them shows that they are not at the beginning of the line.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole

@@ -280,7 +280,10 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load the robot if `source` is standard input, which can be read only once."""
+    """Load the robot from standard input if `source` is "-"; otherwise return `source`.
+
+    Standard input can be read only once.
+    """
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source

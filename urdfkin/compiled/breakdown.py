@@ -125,7 +125,9 @@ def acceleration_breakdown(
 ) -> AccelerationBreakdown:
     """Split the classical acceleration of a link's frame into contributions, for n configurations.
 
-    `base` (1 or n, 24) is the state of the base, see `BaseMotion.state`; `out` is (n, joints, 4, 6).
+    `base` is the state of the base: an array (1, 24) for all configurations, or an array (n, 24).
+    `BaseMotion.state` defines the 24 numbers. If `out` is given, the contributions of the joints are written
+    to this array (n, joints, 4, 6).
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
@@ -192,7 +194,10 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return the vectors (n, links, 3) from each link's origin to the path's end, in world axes."""
+    """Return the vector from the origin of each link on the path to the origin of the last link.
+
+    The vectors (n, links, 3) are in world axes.
+    """
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]

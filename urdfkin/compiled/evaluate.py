@@ -307,10 +307,10 @@ def _processors() -> int:
 def compute_in_blocks(
     compute: BlockFunction, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
 ) -> int:
-    """Compute `out` (n, ...) in several threads; each array of `inputs` is (n, ...) or (1, ...).
+    """Compute `out` (n, ...) in several threads.
 
-    All arrays are C-contiguous, and `compute` must release Python's global interpreter lock. The result is 1
-    if an input is nan, infinite or too large, else 0.
+    Each array of `inputs` is (n, ...) or (1, ...). All arrays are C-contiguous, and `compute` must release
+    Python's global interpreter lock. The result is 1 if an input is nan, infinite or too large, else 0.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)

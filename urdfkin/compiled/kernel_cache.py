@@ -1,4 +1,7 @@
-"""The cache folder of compiled kernels, and events of compilations; this module does not import Numba."""
+"""Find the cache folder of compiled kernels, and report when a compilation begins and ends.
+
+This module does not import Numba.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,11 @@ from urdfkin.system.locks import import_lock, make_fork_safe_lock
 #: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
 #: The import of Numba acquires this lock first and then `logging`'s lock.
-#: Therefore, `logging`'s lock must be created earlier.
+#: A fork must acquire both locks in the same order, so `logging`'s lock must be created before this lock.
 compile_lock = make_fork_safe_lock()
 
-#: A function with two arguments: the kernel's name, and the duration (s), or None when compilation begins.
+#: A function with two arguments: a kernel's name, and the duration (s) of the kernel's compilation.
+#: When the compilation begins, the second argument is None.
 Listener = Callable[[str, float | None], None]
 
 
@@ -53,7 +57,8 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
     """Inform the listener when the compilation of a kernel begins and ends.
 
-    The context yields a function that the caller must call before it compiles the kernel.
+    The context yields a function. The caller must call this function immediately before the compilation. If
+    the kernel is loaded from disk, the caller does not call the function, and the listener is not informed.
     """
     starts: list[float] = []
 

@@ -24,8 +24,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: Scratch rows of the 16 numbers of a pose (`_POSE_ROWS`).
-#: Scratch rows of the six numbers of a velocity or an acceleration (`_SIX_ROWS`).
+#: `_POSE_ROWS` lists the rows of scratch memory that contain the 16 elements of a pose.
+#: `_SIX_ROWS` lists the rows that contain the six numbers of a velocity or an acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -87,7 +87,10 @@ def write_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 
 def write_imu(m, s, program, place, sources, b, reference, state, to):
-    """Write accelerometer and gyroscope readings; the base's acceleration contains -gravity."""
+    """Write the readings of an accelerometer and a gyroscope.
+
+    The caller has subtracted gravity from the base's acceleration.
+    """
     _write_six_vector(m, s, program, place, b, state[5], state[2], to)
 
 
@@ -166,7 +169,11 @@ def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
 
 
 def _reference_point(reference, x):
-    """Return x, the position or velocity of the frame's origin; for WORLD, return 0."""
+    """Return the position or the velocity of the point to which a Jacobian refers.
+
+    `x` is the position or the velocity of the frame's origin. In the reference frame WORLD, the Jacobian
+    refers to the world's origin, so the result is 0.
+    """
     if reference == _WORLD:
         nil = broadcast(0.0)
         x = nil, nil, nil
@@ -227,9 +234,9 @@ def _add_column_derivatives(s, program, i, first, end, reference):
 
     Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
     parts of column i turn with the earlier joint. A later joint moves only the reference point of the column,
-    which is the frame's origin. For WORLD, the reference point does not move, so a later joint does not
-    change the column. For LOCAL, an earlier joint moves the column and the frame together. The components of
-    the column in the axes of the frame therefore do not change.
+    which is the frame's origin. In the reference frame WORLD, the reference point does not move, so a later
+    joint does not change the column. An earlier joint moves the axis of column i and the frame as one rigid
+    body. In the reference frame LOCAL, an earlier joint therefore does not change the column.
     """
     v_i, w_i = load_vector(s, program[i]), load_vector(s, program[i] + 3)
     for j in range(first, end, HESSIAN_COLUMN_WIDTH):

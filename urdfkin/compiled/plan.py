@@ -1,9 +1,9 @@
-"""A robot's tree as arrays, and as a program: the list of instructions that a kernel executes.
+"""Convert a robot's tree to arrays, and to a program for the kernels.
 
-A moving joint is called a step. As in the textbook, every joint frame is rotated so that the joint's axis is
-z. A revolute joint then rotates about z, and a prismatic joint translates along z. Fixed joints are merged
-into the constant offsets between moving joints. At a branch of the tree, a program saves the state of a link
-to memory.
+A program is a list of instructions that a kernel executes. A moving joint is called a step. As in the
+textbook, every joint frame is rotated so that the joint's axis is z. A revolute joint then rotates about z,
+and a prismatic joint translates along z. Fixed joints are merged into the constant offsets between moving
+joints. At a branch of the tree, a program saves the state of a link to memory.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
 class CompiledTree:
     """The moving joints and the frames that a computation needs, stored in arrays.
 
-    Each joint comes after all joints between it and the base.
+    The joints are in an order from the base outwards: every joint comes after the joints before it on the
+    path from the base.
 
     Attributes:
         joints: Indices of the moving joints in the tree's list of joints.
@@ -94,15 +95,17 @@ class CompiledTree:
         columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
         multipliers: (columns,) factor of each Jacobian column. The factor is the multiplier in the joint's
             mimic rule, or 1 if the joint has no mimic rule.
-        sum_columns: (frames, columns) index of the column to which each Jacobian column is added; -1 if the
-            column's joint does not move the frame. The columns of a joint and of its mimic joints are added
-            together. The sum is stored in the column of the joint that comes first on the path to the frame.
+        sum_columns: (frames, columns) integers, one row for each frame. Element c is -1 if the joint of
+            column c does not move the frame. Otherwise, element c is the index of the column to which column
+            c is added. Joints with the same index in v, such as a joint and its mimic joints, share one
+            column. The shared column is the column of the first of these joints on the path to the frame.
         q_indices: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
-        lengths: (steps + frames,) lengths (m) of paths. The length of a path is the sum of `Joint.length`
-            over the joints on the path, including fixed joints. The first elements are for the paths from
-            the previous moving joint to each moving joint. The other elements are for the paths from the last
-            moving joint to each frame, in the order of `frames`.
+        lengths: (steps + frames,) lengths (m) of paths: first one path for each moving joint, then one for
+            each frame, in the order of `frames`. The path of a joint begins at the previous moving joint and
+            ends at the joint. The path of a frame begins at the frame's last moving joint and ends at the
+            frame. Without a previous moving joint, the path begins at the base. A length is the sum of
+            `Joint.length` over the joints after the beginning of the path, including fixed joints.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
             output order.
@@ -209,7 +212,10 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """The pose of a link relative to its last moving joint; `step` is -1 if no joint moves the link."""
+    """The pose `T` of a link relative to the last moving joint before the link.
+
+    `step` is the row of this joint in `CompiledTree.steps`, or -1 if no joint moves the link.
+    """
 
     step: int
     T: FloatArray
@@ -347,13 +353,15 @@ INSTRUCTION_WIDTH = 5
 #: The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: Rows of scratch memory. Row 0 contains the number 0, and row 1 contains the number 1.
-#: Rows 2 to 17 contain the results of a frame, row 18 a joint angle, and later rows all other numbers.
+#: Rows 2 to 17 contain the results of a frame, and row 18 contains a joint angle.
+#: All other numbers are in the rows from row 19 on.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers for one Jacobian column in a Hessian.
-#: The first two integers are the scratch row of the column, and the joint's row in `steps`.
-#: The last two integers are the joint's index in v, and the first scratch row of a sum.
-#: The sum adds up derivatives with respect to the joint's motion.
+#: Number of integers that describe one Jacobian column in the program of a Hessian.
+#: The first integer is the first scratch row of the column.
+#: The second integer is the row in `steps` of the joint to which the column belongs.
+#: The third integer is this joint's index in v.
+#: The fourth integer is the first scratch row of a sum of derivatives with respect to this joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -390,11 +398,11 @@ class KernelProgram:
 def compile_program(
     plan: CompiledTree, *, orientations: bool, columns: bool = False, hessian: bool = False
 ) -> KernelProgram:
-    """Return the program for the frames of a compiled tree; the tree stores the program.
+    """Return the program for the frames of a compiled tree.
 
-    If `orientations` is true, the program also computes the orientation of each frame. Placements need the
-    orientation, and so do results in the frame's own axes. If `hessian` is true, mimic joints have separate
-    Jacobian columns, as a Hessian requires.
+    The tree stores the program for later calls. If `orientations` is true, the program also computes the
+    orientation of each frame. The orientation is needed for placements, and for results in the frame's own
+    axes. If `hessian` is true, mimic joints have separate Jacobian columns, as a Hessian requires.
     """
     key = orientations, columns, hessian
     program: KernelProgram | None = plan.cache.get(key)
@@ -473,7 +481,11 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state after joint `step` if an event with an index above `following` needs this state."""
+        """Add a SAVE instruction if the state after joint `step` is needed again later.
+
+        The event with the index `following` finds the state in the registers. Later events need a saved
+        state.
+        """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
 
@@ -489,7 +501,10 @@ class _ProgramWriter:
         return len(self.constants) - len(numbers)
 
     def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
-        """Add the instructions for a translation by p and a rotation by R; return whether any was added."""
+        """Add the instructions for a translation by p and a rotation by R.
+
+        Return whether any instruction was added.
+        """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -592,16 +607,21 @@ def _block_starts(indices: Sequence[int]) -> list[int]:
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
-#: Number of bytes in a cache line; access to a vector in two cache lines takes twice as long.
+#: Number of bytes in a cache line.
+#: Access to a vector in two cache lines takes twice as long as access to a vector in one cache line.
 _CACHE_LINE = 64
-#: The integer of each reference frame in a kernel; any other frame raises a KeyError.
+#: The integer that represents each reference frame in a kernel.
+#: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Indices of a kernel's arguments; KERNEL and later arguments belong to calls with one configuration."""
+    """Indices in the array of a kernel's arguments.
+
+    The arguments from KERNEL to COUNT are used only by functions that compute a single configuration.
+    """
 
     PROGRAM = 0
     CONSTANTS = auto()
@@ -613,7 +633,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Number of doubles from one configuration to the next; 0 if all configurations use the same numbers.
+    #: Number of doubles from the beginning of one configuration to the beginning of the next configuration.
+    #: A stride is 0 if the array has only one row, which is used for all configurations.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -1,10 +1,11 @@
-"""Decide when a kernel is loaded or compiled; this decision does not import Numba.
+"""Decide when a kernel is loaded or compiled.
 
-For a few configurations, Python is faster than loading or compiling a kernel. For each kernel, this module
-therefore adds up the time (s) of computations without the kernel. The time in the table also includes the
-estimated time of the next computations.
+Numba is imported only when a kernel is loaded or compiled. For a few configurations, plain Python takes less
+time than loading or compiling a kernel. For each kernel, this module therefore adds up the time (s) that
+plain Python has taken. The table lists what this module does when the sum passes a threshold. The sum then
+also includes the estimated time of the next computations in plain Python.
 
-| time without a kernel | action |
+| time in plain Python | action |
 |---|---|
 | more than `LOAD_AFTER` | read the kernel from disk |
 | more than `BACKGROUND_AFTER`, no kernel on disk | compile it in a second process; Python still computes |
@@ -30,10 +31,11 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) for the computing time without a kernel.
+#: Thresholds (s) for the time in plain Python.
 #: The table in the module's docstring lists the action for each threshold.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: This threshold (s) applies instead of `LOAD_AFTER` after the first kernel is loaded.
+#: Threshold (s) for loading a kernel after the first kernel was loaded.
+#: The threshold for the first kernel is `LOAD_AFTER`.
 _LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED = 5e-5
@@ -67,14 +69,14 @@ def use_only(mode: ComputeMode) -> Iterator[None]:
 
 
 def add_time(name: str, seconds: float) -> None:
-    """Add the seconds of a computation that did not use the kernel `name`."""
+    """Add `seconds` to the total time of computations without the kernel `name`."""
     _seconds_spent[name] = _seconds_spent.get(name, 0.0) + seconds
 
 
 def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_MODULE) -> Any:
-    """Return a kernel, or None if computing without the kernel is faster.
+    """Return a kernel, or None if plain Python is faster.
 
-    `expected_seconds` is the estimated time (seconds) of the next computations without the kernel.
+    `expected_seconds` is the time (s) that the next computations would take in plain Python.
     """
     if _modes and _modes[-1] == "interpreted":
         return None
@@ -97,8 +99,8 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 def should_load_single(name: str) -> bool:
     """Return whether to load the function that computes one configuration with the kernel `name`.
 
-    If the kernel is loaded and `use_only` is not active, each call of `should_load_single` adds
-    `_SECONDS_SAVED` to a sum. The sum is the time (s) that the function could have saved.
+    Each call of `should_load_single` adds `_SECONDS_SAVED` to the time (s) that the function could have
+    saved. A call adds nothing while `use_only` is active, or before the kernel is loaded.
     """
     if _modes:
         return _modes[-1] == "compiled"

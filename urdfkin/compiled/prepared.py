@@ -94,7 +94,8 @@ class PreparedFrame:
         #: Whether `Robot.prepare` created this object.
         #: The first call of an object from `Robot.prepare` loads or compiles machine code.
         self.always_load = False
-        # `_compute_first` creates the function of a quantity and assigns this function to the attribute.
+        # Each attribute first contains `_compute_first`.
+        # `_compute_first` replaces the attribute by the fast function of the quantity.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -102,7 +103,8 @@ class PreparedFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # The object contains addresses of this process, so unpickling calls `Robot.prepare`.
+        # The fast functions contain memory addresses that are valid only in this process.
+        # Unpickling therefore makes a new object with `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
     def placement(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
@@ -174,9 +176,10 @@ class PreparedFrame:
         )
 
     def _compute_first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        """Create a quantity's fast function and call the fast function.
+        """Create the fast function of a quantity, and return its first result.
 
-        Return None if the fast function cannot be used, saves no time, or returns None.
+        Return None if `Robot` must compute the result. For example, loading the fast function may take longer
+        than the computation.
         """
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large

@@ -145,7 +145,7 @@ class Product:
 
 
 class ConstantNumber:
-    """The constant 0 or 1; the value None is the placeholder `unused()`."""
+    """The constant 0, the constant 1, or the placeholder `unused()` (`value` is None)."""
 
     __slots__ = ("value",)
 
@@ -178,7 +178,10 @@ class ConstantNumber:
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float; the number must not be `unused()`."""
+    """Return a number as a float.
+
+    The number must not be `unused()`.
+    """
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)
@@ -201,7 +204,7 @@ def unused() -> ConstantNumber:
 
 
 def round_product(x: Any) -> Any:
-    """Multiply the factors of a product and round the result; return other numbers unchanged."""
+    """Multiply the factors of a `Product` and round the result; return any other number unchanged."""
     return Number(x.x * x.y) if type(x) is Product else x
 
 

@@ -16,8 +16,8 @@ world axes. The joint axis and the interorigin vector have constant components i
 | `world_axes` | rotated by R | unchanged |
 | `link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
 
-The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
-add the rounding errors of another rotation.
+The recursion uses the axes in which the result is requested. If the result were rotated to these axes at the
+end, this rotation would add rounding errors.
 
 The placeholder `unused()` replaces each vector that a result does not need. In a kernel, operations with the
 placeholder take no time. `urdfkin.compiled.machine.kernels` compiles copies of these functions with Numba's
@@ -111,7 +111,10 @@ def express(axes, R, x):
 
 
 def express_after_rotation(axes, S, x):
-    """Return the components of a vector x after the link's frame is rotated by S; x itself stays the same."""
+    """Return the new components of a vector after the link's frame is rotated by S.
+
+    `x` contains the old components. The rotation of the frame does not change the vector itself.
+    """
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 
@@ -135,7 +138,7 @@ def translate_frame(axes, state, d):
 def rotate_frame(axes, state, S):
     """Return a link's state after the link's frame is rotated by S, so that R becomes R S.
 
-    The motion of the link stays the same; only its components in link axes change.
+    The motion of the link does not change. Only the components of the motion in link axes change.
     """
     R, p, w, vel, alpha, acc = state
     return (
@@ -149,7 +152,10 @@ def rotate_frame(axes, state, S):
 
 
 def _rotate_about_z(axes, state, s, row):
-    """Rotate the frame about z (7.5); `row` and `row + 1` store the sine and the cosine."""
+    """Rotate the frame about z (7.5).
+
+    The scratch rows `row` and `row + 1` contain the sine and the cosine of the angle.
+    """
     return rotate_frame(axes, state, eq.about_z(load_number(s, row), load_number(s, row + 1), zero(), one()))
 
 
@@ -300,9 +306,9 @@ def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read q, v or a of `m` configurations into scratch memory, in blocks of eight numbers.
 
     `blocks` contains the first index of each block that the recursion needs. A whole block is read faster
-    than a part of a block. The last block of a configuration may therefore contain surplus numbers of the
-    next configuration. Inputs that are read later may overwrite surplus numbers. No instruction uses the
-    surplus numbers that remain.
+    than a part of a block. If a configuration ends inside a block, the function may therefore also read the
+    first numbers of the next configuration. Inputs that are read later overwrite these surplus numbers, or no
+    instruction uses the surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -452,11 +458,11 @@ def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, sto
 
 
 def forward_recursion(address, axes, orders, mask, store, column, write):
-    """Execute a program for every block; return 1 if an input is nan, infinite or too large, else 0.
+    """Execute a program for every block of configurations.
 
-    `address` is the address of the kernel's arguments, which `KernelArgs` describes. The number `orders` is 1
-    for q, 2 for q and v, and 3 for q, v and a. `mask`, `store`, `column` and `write` are functions of
-    `urdfkin.compiled.outputs`.
+    Return 1 if an input is nan, infinite or too large, else 0. `address` is the address of the kernel's
+    arguments, which `KernelArgs` describes. The number `orders` is 1 for q, 2 for q and v, and 3 for q, v and
+    a. `mask`, `store`, `column` and `write` are functions of `urdfkin.compiled.outputs`.
     """
     args = integers_at(address)
     program, g, s = integers_at(args[_PROGRAM]), doubles_at(args[_CONSTANTS]), doubles_at(args[_SCRATCH])

@@ -63,7 +63,8 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Code with dynamic globals contains addresses of this process, so it cannot be cached.
+        # Code with dynamic globals contains memory addresses that are valid only in this process.
+        # Such code cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -114,10 +115,10 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 
 
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler of functions that only kernels call; it produces LLVM code, but no machine code.
+    """A compiler of functions that only kernels call.
 
-    The functions must not contain closures or array expressions, because this compiler omits Numba's passes
-    for closures and for array expressions.
+    The compiler produces LLVM code, but no machine code. The functions must not contain closures or array
+    expressions, because this compiler omits Numba's passes for closures and for array expressions.
     """
 
     def define_pipelines(self) -> list[Any]:

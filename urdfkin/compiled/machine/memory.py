@@ -83,7 +83,10 @@ def broadcast(context: Any, x: Any) -> Any:
 
 @intrinsic
 def array_data(context: Any, array: Any) -> Any:
-    """Return a pointer to an array's numbers; an index into the pointer must not be negative."""
+    """Return a pointer to an array's numbers.
+
+    An index into the pointer must not be negative.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -117,7 +120,10 @@ def _slice_vector(builder: Any, vector: Any, start: int, width: int) -> Any:
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal length; the number of vectors must be a power of two."""
+    """Concatenate vectors of equal length.
+
+    The number of vectors must be a power of two.
+    """
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -126,10 +132,11 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Divide a matrix into square blocks, and transpose each block; `vectors` are the rows of the matrix.
+    """Divide a matrix into square blocks, and transpose each block.
 
-    The number of rows is a power of two. Blocks of 2 by 2 numbers are transposed first. To transpose a
-    larger block, the function exchanges the block's upper right quarter with the lower left quarter.
+    `vectors` are the rows of the matrix. The number of rows is a power of two. Blocks of 2 by 2 numbers are
+    transposed first. To transpose a larger block, the function exchanges the block's upper right quarter with
+    the lower left quarter.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -222,7 +229,10 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @inline
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Write `count` scratch rows to the array `to`; if `m` is 1, write only one configuration."""
+    """Copy `count` rows of scratch memory to the array `to`.
+
+    If `m` is 1, the function copies only the numbers of one configuration.
+    """
     i = 0
     if m == 1:
         for i in range(count):
@@ -243,7 +253,10 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @intrinsic
 def _prefetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the cache line of `x[at]` into the cache; an address beyond the array causes no error."""
+    """Load the cache line of `x[at]` into the cache.
+
+    An address beyond the array causes no error.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -339,10 +352,11 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
+    """Copy the first `count` numbers of `x` to `to[at]` and the following elements.
 
-    A processor must read a cache line before it writes a part of the line, but not before it writes the whole
-    line. `address` is the address of `to[0]`.
+    Whole cache lines are written to memory directly, not to the caches. Before a write of a part of a cache
+    line, the processor must read the line. A write of a whole line needs no read. `address` is the address of
+    `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

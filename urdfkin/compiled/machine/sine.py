@@ -29,7 +29,10 @@ _2_PI = 2.0 / math.pi
 
 @inline
 def sine_cosine(s, row, x):
-    """Return the sines and the cosines of angles; the scratch memory row `row` may be overwritten."""
+    """Return the sines and the cosines of angles.
+
+    If an angle is nan or very large, the function overwrites the row `row` of scratch memory.
+    """
     sine, cosine = _small_sine_cosine(x)
     if _any_large(x):
         store_number(s, row, x)

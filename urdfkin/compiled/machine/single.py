@@ -46,8 +46,9 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
 
 #: Number of 8-byte words in the header of a Python object.
 _HEADER_WORDS = object.__basicsize__ // 8
-#: A Python object consists of 8-byte words. `_TYPE` is the index of the word that refers to the type.
-#: `_ITEMS` is the index of the word that refers to a tuple's first item.
+#: A Python object consists of 8-byte words.
+#: The word with the index `_TYPE` is the memory address of the object's type.
+#: In a tuple, the word with the index `_ITEMS` is the memory address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The lower four bytes of the word `_NDIM` contain the number of axes.
@@ -59,8 +60,9 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS + 5,
     _HEADER_WORDS + 6,
 )
-#: Index of a word in the C structure PyArray_Descr, which describes the elements of an array.
-#: This word contains the byte order and the type number.
+#: The C structure PyArray_Descr describes the type of an array's elements.
+#: Its word with the index `_KIND_AND_ORDER` contains the byte order and the type number.
+#: `_NATIVE` is the native byte order, and `_DOUBLE` is the type number of doubles.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.
@@ -105,10 +107,10 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles of an array; return 0 for an object that is not as expected.
+    """Return the address of the doubles of an array, or 0 if the array is not as expected.
 
-    The expected object is an array of doubles with the flags `flags` and `axes` axes. The first axis has the
-    length `rows`, and each other axis has the length `columns`.
+    The array must contain doubles and have NumPy's flags `flags`. The number of axes must be `axes`. The
+    first axis has the length `rows`, and each other axis has the length `columns`.
     """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
@@ -128,10 +130,13 @@ def one_configuration(bound, arguments, count):
 
     The function also returns None if another thread is using the scratch memory, or if an input is nan,
     infinite or too large. `arguments` is the address of `count` arguments. The first arguments are q, or q
-    and v, or q, v and a. The last argument is the output array or None. `bound` is the address of a tuple.
-    The tuple begins with the array of kernel arguments, NumPy's array type and None. The next two items are
-    the function that creates the result array, and the shape of the result array. The last items are objects
-    that must stay alive as long as the compiled function.
+    and v, or q, v and a. The last argument is the output array or None. `bound` is the address of a tuple
+    with these items:
+
+    - Item 0 is the array of kernel arguments.
+    - Item 1 is NumPy's type of arrays, and item 2 is None.
+    - Item 3 is the function that creates the result array, and item 4 is the shape of this array.
+    - The other items are objects that must stay alive as long as the compiled function.
     """
     items, inputs = integers_at(bound), integers_at(arguments)
     address, ndarray, none = integers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -211,8 +216,9 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: The entry of a quantity has the kernel, the kernel for LOCAL, and the number of inputs (q, v and a).
-#: The last number of an entry counts the axes of length nv in the result array.
+#: Each quantity has a kernel for WORLD and LOCAL_WORLD_ALIGNED, and a kernel for LOCAL.
+#: The first number is the number of inputs: 1 for q, 2 for q and v, or 3 for q, v and a.
+#: The second number counts the axes of length nv of a result: 1 for a Jacobian (6, nv), 2 for a Hessian.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
