@@ -34,7 +34,7 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Maximum error of a correct pose: of a coordinate in metres, and of an entry of the rotation matrix.
+#: A pose is correct if no coordinate (m) and no entry of the rotation matrix has a larger error than this.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 TOLERANCE = 1e-9
 #: Time limit (s) of the process that tests the remaining features.
@@ -115,7 +115,11 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Measure the given libraries. All other libraries keep their earlier values."""
+    """Measure the given libraries, and return the page's data with the new results.
+
+    `before` contains the earlier results of all libraries. The results of libraries that are not measured
+    remain.
+    """
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}
@@ -143,7 +147,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # maps the letter of each footnote to a documented difference
+    notes: dict[str, Any] = {}  # Footnotes by letter. A footnote is a difference that a library documents.
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:
