@@ -1,7 +1,7 @@
 """Compare a URDF with the Denavit-Hartenberg table that its vendor publishes.
 
-The table may have another base frame, another tool frame and other zero positions of the joints than the
-URDF. You learn that `compare` first removes these differences by a fit. Then `compare` computes the largest
+You learn that the table and the URDF may have different base frames, tool frames and zero positions of the
+joints. The function `compare` removes these differences by a fit. Then `compare` computes the largest
 distance between the table's tip and the URDF's tip, and lists the cells of the table that differ.
 """
 

@@ -44,7 +44,7 @@ from urdfkin.verify.verifier import compute_bound
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Maximum numbers of configurations and of frames for which the script stores results of a robot.
+#: For each robot, the script stores results for at most STORED configurations and STORED_FRAMES frames.
 STORED, STORED_FRAMES = 9, 6
 #: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED_INDEX = 3

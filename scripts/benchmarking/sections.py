@@ -273,7 +273,7 @@ def _make_entry(
 ) -> dict[str, Any]:
     """Return the median time of each step over all rounds.
 
-    Each round gives one time for each step: no difference combines times of different rounds.
+    In each round, the time of a step is computed only from times of the same round.
     """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)

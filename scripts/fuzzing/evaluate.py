@@ -30,8 +30,8 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: The script compares calls for several frames with calls for one frame.
-#: Calls for one frame compute at most this number of frames.
+#: The script compares a call for several frames with calls for single frames.
+#: At most this number of frames have a call for a single frame.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Distance of the far base from the world's origin, in metres.

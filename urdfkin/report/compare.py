@@ -187,7 +187,7 @@ GROWTH_FACTOR = 2.0
 #: A disagreement in the new report is a regression only if it is larger than this number times eps * scale.
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
-#: A ratio of disagreement to bound in the new report is a regression only if the ratio is above this number.
+#: A larger ratio of disagreement to bound is a regression only if the new ratio is above this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 
@@ -329,7 +329,7 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Find robots whose file was renamed between two reports, and return their new source by old source.
+    """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
 
     A file was renamed if one source is only in the old report, one source is only in the new report, and both
     sources have the same robot name. The robot name must occur only once in each of these two groups.

@@ -77,7 +77,7 @@ def format_ratio(ratio: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value. A value None stands for infinity, so the result is then None."""
+    """Return the largest value. None stands for infinity: if a value is None, the result is None."""
     largest = 0.0
     for value in values:
         if value is None:

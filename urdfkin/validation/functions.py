@@ -77,7 +77,10 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Describe the worst number of this result: its difference, divided by its bound, is largest."""
+        """Describe the worst number of this result.
+
+        The worst number has the largest ratio of difference to bound.
+        """
         with np.errstate(all="ignore"):
             over = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
