@@ -16,8 +16,8 @@ A change is a regression in these cases:
 - The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
 - The worst disagreement or the largest ratio is infinite only in the new report.
 
-A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
-rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
+A changed model is not a regression. The comparison lists changes of a joint's axis, placement, limits and
+mimic rule. A renamed file is not a regression: robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations

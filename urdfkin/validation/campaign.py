@@ -156,7 +156,8 @@ def validate(
                 if any(True for _ in collector.missing_chunks(i))
             ]
             if _should_compile(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
-                # If a worker compiled the kernels, the compilation would count as a robot's computing time.
+                # Load or compile the kernels before the workers start.
+                # The computing time of a robot then does not contain the compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()

@@ -294,7 +294,7 @@ def verify_function(
         The result; `print` shows it. In a test: `assert check.agrees, check`.
 
     Raises:
-        UnknownNameError: no such quantity, frame or convention.
+        UnknownNameError: urdfkin does not know the quantity, the frame or the convention.
         InputError: an argument is invalid, or urdfkin cannot check the quantity in this convention.
         VerificationError: urdfkin and the oracle disagree.
 

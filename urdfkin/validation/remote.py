@@ -1,9 +1,10 @@
 """Functions that run on the machines of a cluster.
 
-Dask's worker computes nothing. A chunk runs in a separate process, so a robot can only crash this process,
-not the worker. A chunk that crashes its process is tried a second time in a new process. If the second
-process crashes too, the robot's result is "not verified" with the signal as the reason. Chunks and answers
-are transferred as bytes. The text of a robot is sent only once for all chunks of the robot.
+Dask's worker computes nothing. The worker starts a separate process for the chunks, so a robot can crash this
+process, but not the worker. If a chunk crashes the process, the worker runs the chunk again in a new process.
+If the new process crashes too, the robot's result is "not verified"; the reason is the signal or exit status.
+Chunks and answers are transferred as bytes. A chunk does not contain the text of the robot. The text is sent
+separately, so that it is not sent again with every chunk.
 """
 
 from __future__ import annotations
