@@ -9,9 +9,9 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
-# This text sets all joints to the pose `neutral`, and then sets three joints to other angles.
-# An angle is a number of radians, a number of degrees with `deg`, or a multiple of pi.
-# A mapping from joint names to values also works.
+# The text describes a configuration: all joints have their values in the pose `neutral`, except three joints.
+# An angle without a unit is in radians; `-30deg` is in degrees; `-2*pi/3` is a multiple of pi.
+# Instead of a text, you can pass a mapping from joint names to values.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85

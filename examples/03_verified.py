@@ -1,6 +1,7 @@
-"""Check results against Pinocchio, read the certificate, and check only a part of a large batch.
+"""Compare urdfkin's results with Pinocchio's results, and print the certificate of the checked calls.
 
-You learn how to check a single call with `verify`, and how `certificate()` lists all checked calls.
+You learn how to choose the check of a single call with `verify`: all results, a sample, or none. You also
+learn that `certificate()` counts checked and unchecked results.
 """
 
 import urdfkin

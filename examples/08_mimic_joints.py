@@ -1,7 +1,7 @@
-"""Use mimic joints: a finger that mimics another one has no coordinate.
+"""Compute with mimic joints: one finger of a gripper mimics the other finger.
 
-You learn that `q` contains no mimic joints. In the Jacobian, the column of the mimicked joint includes
-the motion of the mimic joint. `mimic=False` makes mimic joints free.
+You learn that `q` contains no mimic joints. The Jacobian has one column for the mimicked joint, which
+includes the motion of the mimic joint. With `mimic=False`, mimic joints are independent joints.
 """
 
 import numpy as np

@@ -5,8 +5,9 @@ axe, and looks for serious violations, errors in the console, sideways scrolling
 The script also moves through the page with the Tab key, checks the HTML, and prints the page to a PDF.
 `--output` saves pictures of all screens and of the printed pages.
 
-The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. A newer axe and
-the Nu HTML checker, which needs Java, are optional. Debian's poppler-utils draws the printed pages.
+The script needs Debian's chromium and chromium-driver. The extra `test` contains axe-core. Three tools are
+optional: a newer axe, the Nu HTML checker (needs Java), and Debian's poppler-utils. The tool poppler-utils
+converts the pages of the PDF to pictures.
 
     npm install --prefix ~/.cache/urdfkin-audit axe-core vnu-jar
     python -m scripts.audit_pages --output /tmp/audit
@@ -51,10 +52,10 @@ TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
 #: Time limit (s) of axe-core; a page of 100,000 elements takes half a minute.
 _AXE_SECONDS = 600
-#: Violations of these severities count as errors; other violations are only printed.
+#: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Maximum number of presses of the Tab key on a page, and maximum number of drawn pages.
+#: Number of times that the script presses the Tab key on a page, and maximum number of PDF pages in pictures.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
 #: The site's theme hides some elements if Chromium reports no mouse.
@@ -102,7 +103,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # whether to test the keyboard, the HTML and the printed page too
+    whole: bool = True  # False: only check the screens, not the keyboard, the HTML and the PDF
 
 
 def read_axe_script() -> str | None:
@@ -218,7 +219,8 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def open_page(browser: Browser, page: Page) -> None:
-    browser.chrome.get("about:blank")  # A change of the fragment alone does not reload a page.
+    # Chromium does not reload a page if the new address differs only in the part after `#`.
+    browser.chrome.get("about:blank")
     browser.chrome.get(page.url)
     if page.ready:
         browser.wait(page.ready)

@@ -21,7 +21,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
+sys.path.insert(0, str(Path(__file__).parents[1]))  # Import urdfkin and `scripts` from this checkout.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # Idle threads of PyTorch slow other libraries.
 
 from scripts.benchmarking import sections as measured
@@ -42,7 +42,7 @@ class BenchmarkSize:
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # approximate number of values in all Jacobians of a batch
+    numbers: int = 4_000_000  # A batch for the section `joints` has Jacobians with about this many elements.
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
     frame_configurations: int = 4_000  # number of configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches

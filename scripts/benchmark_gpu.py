@@ -4,14 +4,13 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The last column is the data rate of the code, as a fraction of the bandwidth of
-the GPU's memory. The bandwidth is the data rate of a copy within this memory. A data rate counts the bytes
-that are read and written.
+median of several launches. A data rate counts the bytes that a program reads and writes per second. The last
+column is the data rate of the code, divided by the data rate of a copy within the GPU's memory.
 
 If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
 `torch.compile`. If PyTorch Kinematics is installed too, the program also measures this library's Jacobian.
-The program checks results of the exported code (without `torch.compile`) and of PyTorch Kinematics before it
-measures their times.
+Before the time measurements, the program checks results of two contenders: the exported code without
+`torch.compile`, and PyTorch Kinematics.
 
 The program needs nvcc, which `make nvcc` installs into the checkout's environment.
 

@@ -4,8 +4,8 @@
 
 The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
 count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
-the branch. If there is no earlier commit to compare with, for example on main or in a shallow clone, the
-script reports this and passes.
+the branch. On main and in a shallow clone, the script finds no base. The script then prints "changelog not
+checked" with the reason, and exits with code 0.
 """
 
 import argparse
@@ -54,7 +54,8 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
+    # git prints one entry for each changed file: added lines TAB deleted lines TAB path NUL.
+    # For a moved file, the entry is: added lines TAB deleted lines TAB NUL old path NUL new path NUL.
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

@@ -10,8 +10,8 @@ multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests 
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
 
-Exit 1: results of this run have different bits, or a result differs from the stored result. With `--within
-SHARE`, a result may differ from the stored result by SHARE times its error bound.
+Exit 1: results of this run have different bits, or a result differs from the stored result. With the option
+`--within 0.1`, a difference from the stored result is allowed up to 0.1 times the result's error bound.
 """
 
 import argparse
@@ -39,11 +39,12 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import compute_bound
 
-#: Sizes of batches: less than one block of eight, exactly one block, and one or many blocks plus a remainder.
+#: Sizes of batches. A kernel computes configurations in blocks of eight.
+#: The batches have less than one block, exactly one block, or one or several blocks and a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Numbers of configurations and of frames whose results are stored.
+#: For each robot, the script stores results for at most STORED configurations and STORED_FRAMES frames.
 STORED, STORED_FRAMES = 9, 6
 #: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED_INDEX = 3

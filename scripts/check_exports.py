@@ -51,9 +51,9 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: Maximum number of joint velocities of a robot whose PyTorch or JAX file contains a Hessian.
+#: A PyTorch or JAX file contains a Hessian only if the robot has at most this number of joint velocities.
 #: The check of a larger Hessian is slow.
-#: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
+#: An `array` file contains a Hessian for PyTorch, but not for JAX: JAX would compile the Hessian for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 
@@ -63,7 +63,10 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) 
 
 
 def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Yield the name of each compiled or Python program, and its largest ratio of an error to a bound."""
+    """Run the exported code in each language. Yield a name of the program, and its largest error ratio.
+
+    An error ratio is the error of a result, divided by the bound on this error.
+    """
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", code.name.upper()
         for compiler in filter(shutil.which, compilers if to in languages else ()):
@@ -89,7 +92,7 @@ def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> I
 
 
 def _largest_ratio(found: Sequence[float], count: int) -> float:
-    """Return the largest error ratio, or NaN if a ratio is NaN or there are not `count` ratios."""
+    """Return the largest error ratio; NaN if a ratio is NaN, or if the number of ratios is not `count`."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 

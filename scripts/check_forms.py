@@ -44,7 +44,8 @@ from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
+#: Octave's symbolic package takes 20 s for a table with six joints.
+#: Therefore, the package computes only 6 tables, and each of these tables has at most 4 rows.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the program that Octave runs, for each format.
@@ -171,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return the excess width (points) of each LaTeX table on the page of an `article`."""
+    """Return for each LaTeX table how much wider it is than the text of an `article`, in points."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -195,7 +196,10 @@ def _find_program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A table, some configurations, and Pinocchio's poses of the table's tip in the table's base."""
+    """A Denavit-Hartenberg table, some configurations, and the tip's poses that Pinocchio computes.
+
+    The poses are relative to the base frame of the table.
+    """
 
     name: str
     job: Job
@@ -206,9 +210,13 @@ class Case:
         return self.job.table
 
     def measure_errors(self, found: FloatArray) -> tuple[float, float]:
-        """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
+        """Return two errors of the poses `found`, which the exported code computes.
+
+        The first error is the largest difference (m) of a coordinate from Pinocchio's tip position. The
+        second error is the largest difference from urdfkin's poses, divided by the bound on rounding errors.
+        """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Even if all lengths of a table are zero, its angles have rounding errors.
+        # Sine and cosine have rounding errors, so the bound is not zero even if all lengths are zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

@@ -3,13 +3,14 @@
     python scripts/check_growth.py                      # 1, 4, 16 and 64 MB of every kind of content
     python scripts/check_growth.py --sizes 1,4 number   # kinds with "number" in the name
 
-If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
-check takes longer than `--patience`, the script does not check larger documents of the same kind.
+If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. After
+a check that takes longer than `--patience`, the script skips the larger documents with the same kind of
+content.
 
-For each kind of content, a function returns a URDF that repeats this content. The function's argument is the
-approximate size of the URDF in bytes. A faulty exporter or an attacker could write such files. urdfkin
-rejects most of these files. The time and memory of the rejection must be proportional to the size of the
-file.
+For each kind of content, a function returns a URDF that repeats this content. The URDF has approximately the
+size (bytes) that the script passes to the function. A faulty exporter or an attacker could write such files.
+urdfkin rejects most of these files. Even then, the time and memory of the check must be proportional to the
+size of the file.
 """
 
 import argparse
@@ -37,7 +38,10 @@ def _robot(inside: str) -> bytes:
 
 
 def _repeat(size: int, piece: str) -> str:
-    """Repeat a piece up to a size in bytes; {i} in the piece is the number of the copy."""
+    """Repeat a piece of XML until the text has about `size` bytes.
+
+    Each copy contains its number in place of `{i}`.
+    """
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
@@ -79,7 +83,7 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _robot_with_many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # Inputs with many comments that suppress findings.
+    # Documents with many or long comments that suppress findings.
     "comments that suppress no finding": _robot_with_many("<!-- urdfkin: ignore[x{i}] y -->\n"),
     "consecutive comments": _robot_with_many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
@@ -163,7 +167,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time and the growth of memory for each MB of a document.
+    """Check a document, and return the processor time and the growth of peak memory, per MB of the document.
 
     The memory includes the findings.
     """

@@ -3,14 +3,16 @@
     python scripts/check_same.py --keep pairs.jsonl          # continues a stopped run
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
 
-`tests/comparison/pairs.py` defines twenty-one changes of a robot. Eleven changes leave the robot the same.
-After such a change, all links must have the poses that `same` predicts, at random configurations. After any
-other change, the robot differs from the original. The change `rounded` is an exception: it rounds numbers
-to four digits, and leaves some robots unchanged. An independent global
-search then looks for the largest distance between a frame of the robot and the corresponding frame of the
-changed robot. The script computes this distance with fifty digits from the decimal numbers in the two URDF
-texts. The distance must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a
-verdict is wrong.
+`tests/comparison/pairs.py` defines twenty-one changes of a robot. After eleven of these changes, `same` must
+find that the robots are equivalent, and must predict the pose of every matched link. The script tests the
+predicted poses at random configurations. After the other ten changes, `same` must find that the robots
+differ. The change `rounded` is an exception: it rounds numbers to four digits, and some robots do not change.
+
+For the ten changes, an independent global search looks for the largest distance between a frame of the robot
+and the corresponding frame of the changed robot. The script computes this distance with fifty digits from the
+decimal numbers in the two URDF texts. The distance must lie in the interval of `same`.
+
+Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
 
 import argparse
@@ -33,7 +35,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of a placement: of its position in metres, and of an entry of its rotation matrix.
+#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation matrix.
 ROUNDING = 1e-10
 
 

@@ -1,7 +1,7 @@
 """Count the files of urdfkin whose functions run during `load` and during `same`.
 
-The count states how many files a reader must open to follow such a call. Code that runs while a module is
-imported does not count.
+A reader must open these files to follow a call of `load` or `same`. A file does not count if its code runs
+only while the file is imported.
 
     python scripts/count_files.py                # load(A) and same(A, B) for two robots of this repository
     python scripts/count_files.py A.urdf         # load(A)
@@ -50,7 +50,7 @@ def files_of_load(source: Path) -> list[str]:
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files whose functions run during `same`, without compiling kernels."""
+    """Return the files whose functions run during `same`, if all kernels are already compiled."""
     same = partial(urdfkin.same, first, second)
     with use_only("compiled"):
         same()

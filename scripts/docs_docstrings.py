@@ -1,7 +1,8 @@
 """Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-The pages show the same text as `help(Robot.jacobian)`, which also lists arguments that several methods share.
-The heading `Example:` is removed, because the site would draw a box around such a section.
+The pages show the same text as `help()` of a method, for example `help(Robot.jacobian)`. This text also
+describes the arguments that several methods have in common. The heading `Example:` is removed, because the
+site would draw a box around the example.
 """
 
 import inspect
@@ -13,9 +14,9 @@ import griffe
 
 from urdfkin.robot import Robot
 
-#: Pattern of a section `Example:` with its indented lines.
+#: Regular expression for the heading `Example:` of a docstring and the indented lines below.
 _EXAMPLE = re.compile(r"^( *)Examples?:\n((?:\1 +\S.*\n?|\n)+)", re.MULTILINE)
-#: Pattern of the lines from a Python prompt to the next blank line.
+#: Regular expression for a Python prompt `>>>` and all lines up to the next blank line.
 _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 

@@ -90,7 +90,7 @@ _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )
-#: A LaTeX command before an argument without braces.
+#: MathML of a sine or cosine whose argument is a symbol without brackets.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
@@ -192,7 +192,7 @@ def make_subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # Other entries of `LIBRARY` document the methods, so the entry of the class `Robot` lists no methods.
+        # The pages document each method of `Robot` in a section of its own, not in the section of the class.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {find_address(name)}\n    options:\n{lines}")

@@ -104,9 +104,9 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Test cases in a loop, which ends when the process is killed.
+    """Run the loop of a worker process: receive the family and number of a case, test it, send the outcome.
 
-    Each pass of the loop receives the family and number of a case, tests the case and sends the outcome.
+    The loop has no end; the parent process kills the worker.
     """
     from scripts.fuzzing.evaluate import evaluate
 

@@ -58,7 +58,9 @@ def package_of(module: str) -> str:
 
 
 def imported_names(text: str) -> Iterator[str]:
-    """Yield the names that a module's text imports. A name from a string ends in `.*`.
+    """Yield the names that a module's text imports.
+
+    A module that is named in a string for a lazy import is yielded with the suffix `.*`.
 
     >>> list(imported_names("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
@@ -100,7 +102,8 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
 def _reexported(package: str) -> frozenset[str]:
     """Return the names that a package's `__init__` imports from other modules.
 
-    If a submodule has such a name, `from package import name` returns the object, not the submodule.
+    A package may import an object that has the same name as one of its submodules. Then
+    `from package import name` returns the object, not the submodule.
     """
     path = modules().get(package)
     if path is None or path.name != "__init__.py":

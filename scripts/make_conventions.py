@@ -211,7 +211,7 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
             find_definition(theirs, readings),
             mujocos,
         )
-    columns = np.zeros((6, 3))  # MuJoCo's `jacp` above `jacr`, at the body's origin
+    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: rows `jacp`, then rows `jacr`
     position = measured.mj_data.xpos[measured.body]
     mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], position, measured.body)
     yield (

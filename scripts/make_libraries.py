@@ -115,7 +115,11 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Measure the given libraries. All other libraries keep their earlier values."""
+    """Measure the given libraries, and return the page's data with the new results.
+
+    `before` contains the earlier results of all libraries. The results of libraries that are not measured
+    remain.
+    """
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}
@@ -143,7 +147,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # maps the letter of each footnote to a documented difference
+    notes: dict[str, Any] = {}  # Footnotes by letter. A footnote is a difference that a library documents.
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

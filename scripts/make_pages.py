@@ -4,9 +4,9 @@
     python scripts/make_pages.py findings accuracy   # some pages
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
-with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
-of their numbers. The tables and the picture of docs/performance.md show the numbers of docs/performance.json.
-`python scripts/benchmark.py --json docs/performance.json` measures these numbers.
+with the output of this script. The accuracy study and the enclosures take minutes, so tests check only some
+numbers on these two pages. The tables and the picture of docs/performance.md show the numbers of
+docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures these numbers.
 """
 
 import argparse
@@ -54,7 +54,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Maps the code of each warning to the meaning of this warning for robots of the catalogue.
+#: Warnings that robots of the catalogue cause: the code of the warning, and an explanation.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -66,7 +66,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Options of `check` that set a size limit, each with the default limit and its unit.
+#: Options of `urdfkin check` that limit the size of the input, with the default limit and the unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
@@ -125,7 +125,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # If an entry has no description, the page shows the description of the entry's type.
+            # Some entries have no description. The page then shows the description of the entry's data type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -235,8 +235,8 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance between two neighbouring doubles.
-            # This distance is computed at the quantity's largest absolute value.
+            # `steps` is the largest width of an interval, in steps between neighbouring doubles.
+            # The step is that of the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

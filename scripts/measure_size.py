@@ -22,7 +22,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
     """Return the sizes (bytes) of a package and its dependencies.
 
-    The result contains neither the package named by `without` nor packages that only this package needs.
+    The result omits the package `without`, and every package that only this package requires.
     """
     sizes: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()

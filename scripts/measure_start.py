@@ -3,10 +3,10 @@
     python scripts/measure_start.py            # measure, write the table; exit 1 if a time is too long
     python scripts/measure_start.py --rounds 3
 
-Each row is a new process, whose time is compared with the time of `import numpy, pinocchio` in the same
-round. The ratio is the quotient of the two medians over all rounds. Other load of the machine slows the two
-processes equally, so it hardly changes the ratio. The bytecode of all modules already exists, as after an
-installation. A fresh cache is an empty folder for compiled kernels.
+Each row of the table is a command that runs in a new process. In each round, every command runs once. The
+ratio of a row is the command's median time, divided by the median time of `import numpy, pinocchio`. If the
+machine has other load, both times grow, and the ratio hardly changes. The bytecode of all modules already
+exists, as after an installation. A fresh cache is an empty folder for compiled kernels.
 """
 
 import argparse
@@ -31,10 +31,10 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 
 @dataclass(frozen=True)
 class Row:
-    name: str  # name of the process on the page
+    name: str  # label of the row on the page
     arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
     max_ratio: float = math.inf  # limit of the time, as a multiple of the time of `import numpy, pinocchio`
-    empty_cache: bool = False  # whether the process starts with an empty kernel cache
+    empty_cache: bool = False  # True: the process finds no compiled kernels on disk.
 
 
 _JACOBIAN = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")
@@ -68,7 +68,10 @@ def measure_seconds(words: Sequence[str], cache: Path | None) -> float:
 
 
 def measure_medians(rounds: int, folder: Path) -> list[float]:
-    """Return the median processor time (s) of each row. The first round only writes bytecode files."""
+    """Return the median processor time (s) of each row.
+
+    The times of the first round do not count, because Python then compiles the modules to bytecode.
+    """
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     seconds: list[list[float]] = [[] for _ in ROWS]

@@ -6,14 +6,16 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
 The script first runs the quick tests in the files that mention the mutated module, and in the files for the
-module's package. If no test fails, --slow runs the slow tests in these files. If still no test fails, --whole
-runs all quick tests. The script prints every undetected mutant, and skips the mutants that docs/mutation.md
-lists as harmless. In the past, no test detected the named mutants. A named mutant replaces code of one
-function, and one given test must now fail.
+module's package. If no test fails, --slow runs the slow tests in these files. If no slow test fails either,
+--whole runs all quick tests. The script prints every undetected mutant, and skips the mutants that
+docs/mutation.md lists as harmless.
+
+A named mutant is a mistake that no test detected in the past. It replaces code of one function. The file of
+named mutants states a test that must now fail.
 
 Exit 0: all mutants are detected or harmless.
 Exit 1: some mutants are not detected, or there is no mutant.
-Exit 2: no file of the package begins with the given path.
+Exit 2: the given part of the package does not exist, or none of its files can have mutants.
 """
 
 import argparse
@@ -42,8 +44,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: The script mutates syntax trees, but Numba compiles the source text of these files. The script skips them.
-#: tests/laws/test_mutation.py mutates them without the compiler.
+#: Files that Numba compiles. The script skips these files, because it changes the syntax tree of a module.
+#: Numba reads the source text instead.
+#: tests/laws/test_mutation.py tests mutants of these files without Numba.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
     "compiled/machine/sine.py", "compiled/machine/single.py", "compiled/outputs.py", "compiled/recursion.py",
@@ -101,7 +104,9 @@ def find_near_tests(path: Path) -> list[str]:
 @dataclass(frozen=True)
 class NamedMutant:
     claim: str  # the mistake that must be detected
-    function: str  # such as `urdfkin.dh.snapping.snap_report`; a module for code outside functions
+    #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
+    #: If the code is outside functions, the full name of the module.
+    function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`
     test: str  # the test that fails with the mutant and passes without it
@@ -130,9 +135,9 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Return the reason why each harmless mutant is harmless.
+    """Read the harmless mutants from docs/mutation.md, each with the reason why it is harmless.
 
-    A key is the function's full name and the text of the mutant.
+    A key is a pair: the full name of the mutated function, and a text such as `1  ->  2`.
     """
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
@@ -188,7 +193,7 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        result = "not run"  # The test failed, but not because of the mutant.
+        result = "not run"  # pytest reports an error, but not a failure of the named test.
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
     return Outcome(mutant, result, detail)

@@ -1,4 +1,4 @@
-"""Write generated parts into a page, each between the comments `<!-- NAME -->` and `<!-- end -->`."""
+"""Write generated parts into a page. The comments `<!-- NAME -->` and `<!-- end -->` enclose a part."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -10,7 +10,8 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 def insert_parts(page: str, **parts: str) -> str:
     """Insert the given parts into a page, and return the page.
 
-    Raise ValueError unless the page has exactly one place for each part.
+    The name of a part is the name in its comment. Raise ValueError if the page has no comment for a part, or
+    has several comments with the same name.
 
     >>> print(insert_parts("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: In a blind test, a reader did not understand sentences with these patterns.
+#: Regular expressions for words that readers did not understand, each with plain words to use instead.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
     r"\b(stands?|stood) still\b": "fixed",

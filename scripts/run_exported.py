@@ -6,9 +6,9 @@ The interpreter does not need urdfkin.
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
 The first argument names the library, `torch` or `jax`. The script runs the function `check` of each file.
-Files of the format `array` use this library. A file with a Hessian contains the true Hessian and error
-bounds. For such a file, the library differentiates the Jacobian, and each error must lie within its bound.
-For the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
+Files of the format `array` use this library. If a file contains a Hessian, the script differentiates the
+file's Jacobian with the library. The result must agree with the true Hessian in the file, within the file's
+error bounds. For the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
 `scripts/check_exports.py --library` calls this script.
 """
 

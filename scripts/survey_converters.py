@@ -10,14 +10,15 @@ usd-exchange contain modules with equal names:
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-With one tool, a row of the table shows the verdict, and bounds on the distance and on the angle between
-matching frames. With several tools, a row has one cell for each tool. The cell shows a short verdict and the
-bound on the distance. The full verdicts are printed to standard error. With several tools, the bounds may
-be larger: to save time, the script computes the bounds without branch and bound.
+The script prints a table with one row for each robot. If the user names one tool, a row shows the verdict of
+`same`, and bounds on the distance and on the angle between matching frames. If the user names several tools,
+a row has one cell for each tool, with a short verdict and the bound on the distance. The full verdicts are
+printed to standard error. For several tools, the script saves time: `same` uses no branch and bound, so the
+bounds may be larger.
 
 The script removes shapes, because a converter would search for their meshes. MuJoCo refuses a moving body
-without mass. The script therefore sets options of MuJoCo. With these options, MuJoCo gives such a body a
-small mass and corrects impossible inertias.
+without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a small mass,
+and correct impossible inertias.
 """
 
 import argparse
@@ -91,7 +92,8 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts. Each key is the beginning of a verdict. The first matching key counts.
+#: Short forms of verdicts. A short form applies to a verdict that begins with the key.
+#: If a verdict begins with several keys, the first key counts.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -138,7 +140,10 @@ def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sam
 
 
 def _write_without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a URDF without shapes, and with MuJoCo's lenient settings, which other tools ignore."""
+    """Write a copy of a URDF without shapes and with the settings `_LENIENT` for MuJoCo.
+
+    Other tools ignore these settings.
+    """
     robot = ElementTree.fromstring(urdf)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
@@ -152,9 +157,9 @@ def _write_without_shapes(urdf: str, folder: Path) -> Path:
 def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
     """Return the verdict, and bounds on the distance and on the angle between matching frames.
 
-    The bounds apply to the unchanged models. For `urdf-usd-converter`, the bound on the distance applies to
-    the models after the changes that make the models equivalent. The last cell of this tool is the largest
-    distance that rounding to single precision can cause.
+    The bounds are for the source and the converted robot as they are. The tool `urdf-usd-converter` has other
+    cells: the bound on the distance is for the models after changes that make the two models as similar as
+    possible. The third cell is then the largest distance that rounding to single precision can cause.
     """
     try:
         comparison = _compare(tool, pythons, robot)

@@ -37,7 +37,8 @@ class Contender:
     library: str
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
-    #: None if the library has no function for batches; the benchmark then calls the library in a loop.
+    #: Function that yields the timed tasks for batches.
+    #: Without this function, the benchmark calls the library once for each configuration, in a loop.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
@@ -187,13 +188,16 @@ LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """Return the index in `ours` of each name in `theirs`."""
+    """Return a list of indices: element i is the position in `ours` of the name `theirs[i]`."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return an array of zeros (n, 6, nv), with the columns of `J` (n, 6, m) at the indices `columns`."""
+    """Add columns of zeros to Jacobians `J` (n, 6, m), and return Jacobians (n, 6, nv).
+
+    Column k of `J` becomes the column `columns[k]` of the result.
+    """
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
@@ -202,8 +206,8 @@ def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
-    Its Jacobians have rows [angular; linear] and one column for each joint, in breadth-first order of the
-    joints. dynibo returns matrices column by column.
+    dynibo's Jacobians have rows [angular; linear], and one column for each joint. The columns are in
+    breadth-first order of the joints. dynibo returns the elements of a matrix column by column.
     """
     import dynibo
 
@@ -320,7 +324,7 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     import roboticstoolbox as rtb
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The library warns that its URDF reader is deprecated.
+        warnings.simplefilter("ignore")  # Hide a warning: the toolbox's URDF reader is deprecated.
         robot: Any = rtb.Robot.URDF(str(workload.file))
     path = robot.ets(end=workload.frame)
     moving = sorted((link for link in robot.links if link.jindex is not None), key=lambda x: x.jindex)

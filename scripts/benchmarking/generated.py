@@ -2,11 +2,11 @@
 
 The benchmark compares the speed of urdfkin's kernels, which compute any robot, with the speed of this code.
 CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
-constants, and omits products with 0 and 1. The code computes several configurations together: each number is
-a SIMD vector of doubles (`generated.c`). The time includes sine, cosine and the transposition of the arrays.
+constants, and omits products with 0 and 1. The code computes several configurations together, with SIMD
+vectors of doubles (`generated.c`). The time includes sine, cosine and the transposition of the arrays.
 
-The code does not check inputs. A non-finite number, or an angle of a million turns, gives a wrong result.
-urdfkin corrects the last digit of sine and cosine. The generated code does not correct this digit.
+The generated code does not check inputs. Its results are wrong if an input is not finite, or if an angle is a
+million turns. The generated code computes sine and cosine without urdfkin's correction of the last digit.
 """
 
 import ctypes
@@ -45,7 +45,7 @@ def frame_results(
     """Return the numbers of a frame's Jacobian or acceleration in world axes, row by row.
 
     The Jacobian uses equation 7.85. The acceleration uses equations 7.127 to 7.130. Each joint has one
-    coordinate. The arguments may be any numbers that the functions of `eq` accept.
+    coordinate. The inputs can be arrays or symbols; `eq` contains the equations for this type.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):

@@ -21,9 +21,11 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the times of a first call: with an empty kernel cache, and with all kernels in the cache.
+#: Names of the two measured times (ms) of a quantity's first call in a process.
+#: For the first time, the kernel cache is empty; for the second time, the cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods whose first call compiles a kernel. Each value is the number of inputs among q, v and a.
+#: Methods of `Robot` whose first call compiles a kernel, each with the number of its inputs.
+#: Number of inputs 1: q; 2: q and v; 3: q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

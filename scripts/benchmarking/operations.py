@@ -1,7 +1,8 @@
-"""Count the additions and multiplications for one configuration, with numbers that record their operations.
+"""Count the additions and multiplications that compute a result for one configuration.
 
-A fused multiply-add counts as two operations, as in the stated peak performance of a machine. A change of
-sign and a product with the constant 0 or 1 do not count.
+The module calls urdfkin's functions with objects that record each operation. A fused multiply-add counts as
+two operations, because manufacturers also count two for the peak performance of a processor. A change of sign
+does not count. A product with the constant 0 or 1 does not count.
 """
 
 from __future__ import annotations
@@ -32,14 +33,15 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number without a value. `operands` are the operands of the operation that yields the number.
+    """A number without a value, which records the operation that yields the number.
 
-    `constant` is 0 or 1 if the number is a constant with this value. For all other numbers, `constant` is
-    None.
+    The field `operands` contains the two numbers that this operation combines. The field `constant` is 0 for
+    the constant zero, 1 for the constant one, and None for every other number.
     """
 
     constant: int | None = None
-    #: True if the results do not depend on this number. Operations with an unused number are not counted.
+    #: True for a number that has no effect on the results.
+    #: An operation is not counted if an operand has no effect on the results.
     unused: bool = False
     operands: tuple[Number, ...] = ()
 

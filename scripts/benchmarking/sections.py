@@ -44,8 +44,8 @@ def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds
 
     The section `batch` measures batches of all contenders. The section `single` measures calls of all
     contenders for one configuration. The sections `checked` and `verified` measure urdfkin and Pinocchio. In
-    the section `checked`, urdfkin computes one configuration per call, and checks each result. In the section
-    `verified`, urdfkin computes batches, and checks all results, a sample of the results, or no result.
+    the section `checked`, urdfkin computes one configuration per call, and checks each result. The section
+    `verified` measures batches of urdfkin with `verify=True`, with `verify="sample"`, and without a check.
     """
     for workload, quantity, table in _open_workloads(section, n):
         title = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
@@ -105,7 +105,10 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """Measure chains of joints; the Jacobians of a batch contain about `numbers` elements."""
+    """Measure chains with the given numbers of joints.
+
+    The size of a batch depends on the chain: all Jacobians of a batch have about `numbers` elements together.
+    """
     for size in joints:
         n = max(numbers // (6 * size), 16)
         with Workload(chain_urdf(size), TIP, n, name=f"chain of {size}") as workload:
@@ -149,12 +152,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# For a batch, the benchmark measures one kernel for each number k of steps.
-# The kernel executes the instructions of the first k steps.
-# The time of step k is the difference between the times of the kernels for k and k - 1 steps.
-# For one configuration, the benchmark measures calls that do only a part of the work.
-# An example is a call that rejects the argument `out`.
-# The time of a step is computed from the differences between the times of these calls.
+# The computation of a batch has several steps, for example the forward recursion.
+# The benchmark measures a kernel for only the first step, a kernel for the first two steps, and so on.
+# The time of step k is the time of the kernel for k steps, minus the time of the kernel for k - 1 steps.
+# For one configuration, the benchmark measures seven lines of Python (`_calls`); most lines omit some steps.
+# For example, the forward recursion does not run if a line passes an invalid array `out`.
+# The time of a step is computed from differences between the times of the lines.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -270,7 +273,7 @@ def _make_entry(
 ) -> dict[str, Any]:
     """Return the median time of each step over all rounds.
 
-    The time of a step in a round is computed only from times that were measured in the same round.
+    In each round, the time of a step is computed only from times of the same round.
     """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)

@@ -18,7 +18,7 @@ _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 #: Sections with measurements for several numbers of joints, frames or configurations.
-#: Each section has a title, and a function that returns the cells of a row.
+#: Each value is the title of the section's table, and a function that formats a row of the table.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -124,7 +124,10 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
 
 
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
-    """Insert the figures into the page. Raise ValueError if a place is missing or occurs twice."""
+    """Insert the figures into the page, at comments such as `<!-- figures: machine -->`.
+
+    Raise ValueError if the page has no comment for a figure, or has two equal comments.
+    """
     parts: dict[str, list[str]] = {"machine": [format_machine(figures)]}
     for words in make_tables(figures):
         parts.setdefault(words.section, []).append(words.text)

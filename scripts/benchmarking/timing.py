@@ -28,7 +28,8 @@ class TimedTask:
     label: str
     n: int
     compute: Callable[[], object]
-    #: Function that returns the results in urdfkin's conventions; None if there is nothing to compare.
+    #: Function that returns the results in urdfkin's conventions, for a comparison with another task.
+    #: None: the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
     remark: str = ""
@@ -135,18 +136,22 @@ class Calls:
     """
 
     label: str
-    names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
-    lines: tuple[str, ...]  # The value of the last line is the result.
-    #: Lines that write the result of configuration k into `out[k]`.
-    #: If None, the value of the last line of `lines` is written into `out[k]`.
+    #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
+    names: Mapping[str, Any]
+    #: Lines that compute one result. The last line is an expression; its value is the result.
+    lines: tuple[str, ...]
+    #: Lines that compute the result of configuration k, and write the result into `out[k]`.
+    #: None: the benchmark uses `lines`, and writes the value of the last line into `out[k]`.
     store: tuple[str, ...] | None = None
-    #: `order[i]` is urdfkin's index of the library's coordinate i. None means that the orders are equal.
+    #: `order[i]` is urdfkin's index of the library's coordinate i.
+    #: None: the library and urdfkin have the same order of coordinates.
     order: list[int] | None = None
-    #: Shape of one configuration's result in a batch; None means urdfkin's shape.
+    #: Shape of the library's result for one configuration, as in `out[k]`.
+    #: None: the library's result has the same shape as urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    #: Converts the value of the last line to an array with the layout of one row of a batch.
+    #: Converts the result of one call to an array with the layout of `out[k]`.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 
@@ -182,14 +187,17 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a) for each configuration, or (q, q, q) if q is the only input."""
+    """Yield q, v and a of each configuration. If the quantity has only the input q, q replaces v and a."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
 def _compile_function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Compile a function: first the line `head`, then the indented lines `body`, which may use `names`."""
+    """Compile a function from lines of Python: a compound statement `head` with the body `body`.
+
+    The lines can use the variables `names`.
+    """
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

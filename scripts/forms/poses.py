@@ -2,8 +2,9 @@
 
     python scripts/forms/poses.py JOBS RESULTS
 
-The file JOBS has a JSON list of {form, text, q}. The script writes a JSON file RESULTS with a list of poses
-for each entry of JOBS.
+The JSON file JOBS contains a list of jobs. A job has the entries `form` (name of the format), `text` (Python
+code of the table) and `q` (list of configurations). The script computes a pose for each configuration. The
+JSON file RESULTS then contains a list of poses for each job.
 
 The interpreter needs the library that the code imports. The script does not import urdfkin, because the
 Robotics Toolbox may have its own environment.

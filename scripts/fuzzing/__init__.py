@@ -25,7 +25,10 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test. `result` is an element of `PASSED`, or the name of the failure."""
+    """The outcome of a test.
+
+    If the test passed, `result` is an element of `PASSED`. If the test failed, `result` names the failure.
+    """
 
     result: str
     details: str = ""

@@ -30,12 +30,13 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: Maximum number of frames that are computed a second time, in a call for one frame.
+#: The script compares a call for several frames with calls for single frames.
+#: At most this number of frames have a call for a single frame.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
-#: Quantities that accept several frames, each with its number of inputs.
+#: Quantities that one call can compute for several frames. A value is the number of inputs among q, v and a.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -227,7 +228,7 @@ def _placements_by_name(
     for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
             yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
-        except UnknownNameError:  # For example, `joint:x` is unknown if x is only a link.
+        except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
             if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.

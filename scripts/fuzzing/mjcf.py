@@ -1,5 +1,6 @@
-"""Make random MJCF files with free bodies that MuJoCo aligns or fuses, equality constraints, and classes.
+"""Make random MJCF files with free joints, equality constraints and default classes.
 
+The options `alignfree` and `fusestatic` let MuJoCo change the bodies of some files.
 A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
 and checks the equality constraints, independently of urdfkin's MJCF reader.
 """
@@ -16,8 +17,8 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Relative tolerance for placements, which are compared with MuJoCo's placements.
-#: The relative tolerance for equality constraints is a thousand times as large.
+#: Relative tolerance for the placements of urdfkin, which are compared with MuJoCo's placements.
+#: Equality constraints have a relative tolerance of 1000 * _TOLERANCE.
 _TOLERANCE = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.

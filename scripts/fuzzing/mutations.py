@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Maximum size (bytes) of a file whose mutants are tested. Larger files are slow, so they are left out.
+#: The script makes mutants of files up to this size in bytes. Mutants of larger files are slow to test.
 LARGEST = 150_000
 
 ODD_NUMBERS = (

@@ -32,7 +32,7 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
-#: XML elements that other programs add to URDF files. {p} is a namespace prefix.
+#: XML elements that other programs add to URDF files. A namespace prefix replaces `{p}`.
 #: A URDF reader must not read links, joints or mimic rules from these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
@@ -71,7 +71,7 @@ def usual_length(rng: random.Random) -> float:
 def odd_length(rng: random.Random) -> float:
     """Return a random length, positive or negative, with an absolute value from about 1e-320 to 1e301.
 
-    The sum of several such lengths usually does not overflow.
+    The absolute value is small enough that a sum of several random lengths usually does not overflow.
     """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])

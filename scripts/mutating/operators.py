@@ -29,7 +29,8 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 class Change:
     """One mutant: a new value for an element of a list or for a field of a syntax node.
 
-    `container` is the list or the syntax node. `key` is the index of the element or the name of the field.
+    To change an element of a list, `container` is the list, and `key` is the index of the element. To change
+    a field of a syntax node, `container` is the node, and `key` is the name of the field.
     """
 
     node: ast.AST  # The description of the mutant quotes the text of this node.
@@ -50,9 +51,9 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Change the tree in place, and yield the previous value.
+        """Change the tree in place, and restore it at the end of the `with` block.
 
-        The end of the `with` block restores the tree.
+        The context manager yields the value that was replaced.
         """
         old = self.put(self.value)
         try:
@@ -97,11 +98,11 @@ def function_at(tree: ast.Module, line: int) -> str:
 
 
 def replace_code(source: str, function: str, before: str, after: str) -> ast.Module:
-    """Return a file's tree in which one piece of the code of a function is replaced.
+    """Replace a piece of code in one function of a file, and return the syntax tree of the changed file.
 
     `function` names a function, a class or a method, such as `Tally.percentile`; "" is the whole file.
     `before` and `after` are expressions, keyword arguments, or statements. Line breaks, brackets and comments
-    do not matter. Raise ValueError unless `before` occurs exactly once in the function.
+    do not matter. Raise ValueError if the function does not contain `before`, or contains it several times.
     """
     tree = ast.parse(source)
     alternatives = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
@@ -135,7 +136,11 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
-    """Parse code as an expression, or as statements and as arguments if the code is not an expression."""
+    """Parse a piece of code, whose kind is unknown, into syntax nodes.
+
+    The code may be an expression. Otherwise, the code may be statements, keyword arguments, or either of
+    them; the result then contains both interpretations.
+    """
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
@@ -157,7 +162,11 @@ def _parse_as(code: str, kind: type) -> list[ast.AST]:
 
 
 def _executed_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a syntax tree that are executed, without types, texts and decorators."""
+    """Yield the nodes of a syntax tree that can have mutants.
+
+    The function omits annotations, type parameters, decorators, format specifications, `__all__`, and blocks
+    that begin with `if TYPE_CHECKING`.
+    """
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):

@@ -15,7 +15,8 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
-#: If the ratio of residuals to estimated noise is below this number, only rounding causes the residuals.
+#: The fit compares the noise in the residuals with an estimate of the noise (`noise_ratio`).
+#: If the ratio is below this number, the report states that the residuals are only rounding errors.
 _ROUNDING = 0.5
 
 

@@ -16,8 +16,8 @@ A change is a regression in these cases:
 - The largest ratio of a disagreement to its bound grew by more than this factor, and exceeds 0.1.
 - The worst disagreement or the largest ratio is infinite only in the new report.
 
-A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
-rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
+A changed model is not a regression. The comparison lists changes of a joint's axis, placement, limits and
+mimic rule. A renamed file is not a regression: robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -184,11 +184,10 @@ def _cell(value: Units | str) -> str:
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Growth by a smaller factor is normal, because the samples are random.
 GROWTH_FACTOR = 2.0
-#: If a disagreement is at most this number after the growth, the growth is not a regression.
-#: The number is in multiples of eps * scale.
+#: A disagreement in the new report is a regression only if it is larger than this number times eps * scale.
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
-#: The ratio of a disagreement to its bound can grow to this number without a regression.
+#: A larger ratio of disagreement to bound is a regression only if the new ratio is above this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 
@@ -196,8 +195,8 @@ _BOUND_RATIO_FLOOR = 0.1
 class ReportChange:
     """A difference between two reports.
 
-    `robot` is None if the difference is about the whole run. `old` is empty if the old report has no value,
-    and `new` is empty if the new report has no value.
+    The field `robot` is None if the difference concerns the whole run. The fields `old` and `new` contain the
+    values in the old and in the new report. A field is empty if its report has no value.
     """
 
     robot: str | None
@@ -213,7 +212,10 @@ class ReportChange:
 
 @dataclass(frozen=True, slots=True)
 class ReportComparison:
-    """All changes between two reports, and the SHA-256 of each robot's text in the new report."""
+    """Comparison of an old and a new validation report: the list of all changes.
+
+    `sha256` contains the SHA-256 of each robot's text in the new report.
+    """
 
     changes: tuple[ReportChange, ...]
     sha256: tuple[str | None, ...] = ()
@@ -312,7 +314,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
     """Return the robots of a report by source.
 
-    If several robots have the same source, the function adds numbers: `ur5`, `ur5 (2)`.
+    If several robots have the same source, a number makes the keys different: `ur5`, `ur5 (2)`.
     """
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
@@ -327,7 +329,11 @@ def robots_by_source(document: Document) -> dict[str, ReportedRobot]:
 def find_renamed_files(
     before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]
 ) -> dict[str, str]:
-    """Return {old source: new source} if exactly one missing and one new source have the same robot name."""
+    """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
+
+    A file was renamed if one source is only in the old report, one source is only in the new report, and both
+    sources have the same robot name. The robot name must occur only once in each of these two groups.
+    """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

@@ -1,8 +1,8 @@
 """Histograms of the disagreements with Pinocchio, and the data of the 3D view.
 
 The plot has one row for each quantity, with all reference frames together. The x axis is logarithmic and
-shows the disagreement in eps * scale. A triangle shows the worst result. A bar shows the range of the bounds,
-because different frames have different bounds.
+shows the disagreement in eps * scale. A triangle shows the worst result. Results have different bounds, so a
+horizontal bar shows the interval from the smallest to the largest bound.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Left end of the x axis, in multiples of eps * scale.
-#: The percentage at the left end is the share of results with a disagreement below this value.
+#: Smaller disagreements have no bars; a percentage at the left end of the plot states their share.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82

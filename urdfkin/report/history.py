@@ -40,12 +40,11 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 #: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
 #: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Maximum number of changes on the page.
-#: On a terminal without --all: maximum number of changes, and maximum number of runs.
-#: The latest changes and runs are shown.
+#: The HTML page lists only this number of changes between runs, the latest changes first.
+#: On a terminal, the option --all removes the limit; otherwise the limit applies to changes and to runs.
 SHOWN = 20
 _MAX_LISTED = 500
-#: Symbol of each verdict; the empty verdict means that the run did not include the robot.
+#: Symbol of each verdict on a robot. The key "" is for a run that did not include the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
@@ -92,7 +91,7 @@ class Point(TypedDict):
 
 
 class RobotHistory(TypedDict):
-    """The results of one robot in all validation runs with this robot."""
+    """The results of one robot, from every validation run that included the robot."""
 
     robot: Annotated[str, doc("The robot's latest source.")]
     points: Annotated[list[Point], doc("The runs of this robot, the oldest first.")]
@@ -118,9 +117,9 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Changes of each robot: each key is the source of a robot.
-#: The value of the key None contains the changes that concern a whole run.
-#: Each value is a list of pairs: the index of a run, and a change.
+#: Changes between runs, by the source of the changed robot.
+#: A change has the key None if it concerns a whole run instead of a robot.
+#: Each change is in a pair with the index of the run in which the change was found.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -128,7 +127,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 class History:
     """Runs and robots of several reports.
 
-    Each key of `robots` is the source of a robot in the latest run with this robot.
+    The keys of `robots` are the sources of robots. If a file was renamed, the key is the latest source.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)
@@ -223,7 +222,8 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 def _in_order(files: Sequence[Path], history: History) -> Iterator[tuple[str, Document]]:
     """Yield reports in the order of start times.
 
-    Other files are added to `history.unusable` or `history.repeated`.
+    A file that is not a readable report is added to `history.unusable`. A second report of the same run is
+    added to `history.repeated`.
     """
     starts = list[tuple[float, str, Path]]()
     for path in files:
@@ -252,9 +252,9 @@ def _make_unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start time of a run in seconds and as text.
+    """Read the start time of a run from its report, and return it as a Unix time (s) and as text.
 
-    If the date is invalid, the number of seconds is infinite.
+    If the report has no valid start time, the Unix time is infinite.
     """
     data = _read_report(path) if is_folder(path) else parse_json(read_bytes(path, MAX_BYTES), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
@@ -384,9 +384,9 @@ def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
 
 
 def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
-    """Return pairs (index of the run, change).
+    """Return all changes between runs, each in a pair with the index of its run.
 
-    The latest run is first. In each run, the regressions are first.
+    The changes of the latest run come first. Within a run, regressions come before other changes.
     """
     all_changes = [(k, change) for k, run in enumerate(history.runs) for change in run["changes"]]
     return sorted(all_changes, key=lambda one: (-one[0], not one[1]["regression"]))

@@ -54,14 +54,15 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: If a page has at most this number of robots, the details of all robots are open when the page loads.
+#: The reader can open and close the details of each robot on the page.
+#: If a report has at most this number of robots, the page shows all details at first.
 _OPEN = 1
-#: Maximum number of failed robots whose details are open when the page loads.
+#: The page shows at first the details of at most this number of robots that are not verified.
 _FAILURES_OPEN = 20
-#: If a report has more robots than this number, only robots that are not verified have histograms.
-#: The reason is computing time: the histograms of one robot take a second.
+#: A report with more robots than this number has no histograms for verified robots.
+#: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
-#: If the details have more characters than this number, each robot has a separate file.
+#: If the details of all robots have more characters than this number, each robot has a separate file.
 MOST = 5_000_000
 
 
@@ -108,7 +109,7 @@ def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
     """Yield the path and the text of each file.
 
     Paths are relative to the page. The page is the last file. If all details together are longer than `MOST`
-    characters, each robot has its own file. For the page `report.html`, these files are in the folder
+    characters, each robot has its own file in a folder. For example, the page `report.html` has the folder
     `report-robots`.
     """
     document = _worst_first(document)
@@ -267,7 +268,7 @@ def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
 
 
 def format_date(started: str) -> str:
-    """Format an ISO date and time, converted to UTC; return other texts unchanged."""
+    """Convert an ISO date and time to UTC, and format it. Return any other text unchanged."""
     moment = utc(started)
     return f"{moment.day} {moment:%B %Y, %H:%M} UTC" if moment else started
 

@@ -1,7 +1,7 @@
 """JUnit XML of a report, and of the checks of `urdfkin verify`.
 
-The layout conforms to junit-10.xsd, the schema of Jenkins; other programs also accept it. The text of the
-element `failure` contains all information, because some programs ignore the attributes of this element.
+The XML conforms to junit-10.xsd, the schema of Jenkins. Other programs also accept this schema. The text of
+the element `failure` contains all information, because some programs ignore the attributes of this element.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: XML 1.0 forbids these characters, even escaped.
+#: Characters that an XML 1.0 file must not contain, not even as a reference such as `&#1;`.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 

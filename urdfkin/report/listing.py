@@ -28,7 +28,10 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table; on a narrow terminal, a long name is on its own line above the other cells."""
+    """Print a table.
+
+    If a name in the first column is wider than the column, the name has its own line above the other cells.
+    """
     from rich.cells import cell_len
 
     ascii_only = out.options.ascii_only

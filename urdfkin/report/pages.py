@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper limit of each colour step in the heat map. A limit is a ratio of a disagreement to its bound.
+#: The heat map shows ratios of disagreement to bound. Each colour ends at one of these ratios.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -171,7 +171,7 @@ def heat_map(
 
 
 def _columns(model: ReportedModel) -> dict[str, list[int]]:
-    """Return each joint's column indices in a Jacobian with separate columns for mimic joints."""
+    """Return the column indices of each joint, for Jacobians in which mimic joints have their own columns."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -193,11 +193,11 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 
 
 def _bound_ratio(check: ReportedCheck, subject: int) -> float:
-    """Return an upper limit of the ratio of disagreement to error bound for a frame, joint or column.
+    """Return an upper limit of the ratio "disagreement / bound" for one subject: a frame, joint or column.
 
-    The document has no error bound for a single frame, joint or column. Therefore, this function divides the
-    largest disagreement of the frame, joint or column by the check's smallest error bound. The result never
-    exceeds the check's largest ratio.
+    The document has bounds only for the whole check, not for each subject. Therefore, this function divides
+    the subject's largest disagreement by the smallest bound of the check. The ratio of a subject is at most
+    the largest ratio of the check, so the function never returns more.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.

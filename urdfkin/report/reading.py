@@ -1,8 +1,9 @@
 """Read report documents, and check the layout and the consistency of all entries.
 
-A report is used as evidence, but may have been edited or truncated. Some entries can be computed from other
-entries: the outcome, verdicts, sums, ratios and percentiles. These entries are computed again and compared.
-The links and joints of a robot must form a tree. The indices of the joints in q and v must be consistent.
+A user relies on a report, but somebody may have edited or truncated the file. The outcome, verdicts, sums,
+ratios and percentiles follow from other entries of the report. This module computes all of them again, and
+reports contradictions. The links and joints of a robot must form a tree. The indices of the joints in q and v
+must be consistent.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 
 def column_names(model: ReportedModel) -> list[str]:
-    """Return the joint name of each column of a Jacobian with separate columns for mimic joints."""
+    """Return the joint name of each column, for Jacobians in which mimic joints have their own columns."""
     return [joint["name"] for joint in model["joints"] for _ in range(_SIZES[joint["kind"]][1])]
 
 
@@ -107,10 +108,9 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
-    """Check the joints' indices in q and v, and the numbers of coordinates and of joint velocities.
+    """Check each joint's index in q and v, and check nq and nv of the robot.
 
-    Yield a text for each error. A joint has an index in q and an index in v. A mimic joint has the indices of
-    its mimicked joint.
+    Yield a text for each error. A mimic joint must have the same indices in q and v as the mimicked joint.
     """
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
@@ -262,15 +262,14 @@ def _check(
 def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
 
-    The ratio must be at least `worst` divided by the largest bound. The ratio must be at most `worst` divided
-    by the smallest bound.
+    `bound_ratio` must lie between two quotients: `worst` / largest bound, and `worst` / smallest bound.
     """
     ratio, largest = _as_number(check["bound_ratio"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # The lower end of `bound` exceeds the upper end if nothing was compared.
+        # A check without results has no bounds: the first number of `bound` is then larger than the second.
         if ratio or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but the check has a disagreement"
         return

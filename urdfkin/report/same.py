@@ -34,7 +34,7 @@ from urdfkin.robot import Robot
 
 #: Maximum number of printed lines for each kind of difference, if the option --all is not given.
 SHOWN = 12
-#: Message about two different models whose joints have different names or a different order.
+#: Message for models that differ, if their joints also have different names or a different order.
 GUESSED = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
@@ -44,8 +44,8 @@ EQUIVALENT = SameQuestion()
 #: A distance or angle of at most FACTOR times the bound on rounding errors is not printed.
 #: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
-#: Heading of a list of mimicked joints.
-#: Within its range, each of these joints can move a mimic joint beyond the limits of the mimic joint.
+#: Heading of a list of mimicked joints whose range is too large for a mimic joint.
+#: Such a joint can move the mimic joint beyond the limits of the mimic joint.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -105,7 +105,7 @@ def _both(metres: float, radians: float) -> str:
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
     """Describe the largest distance and the largest angle between matching frames.
 
-    A distance or angle that rounding errors explain is left out.
+    The text contains no distance and no angle that rounding errors can explain.
     """
 
     def largest(end: str) -> float:
@@ -126,9 +126,9 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Describe the distance and the angle of two matching frames.
+    """Describe the distance and the angle between two matching frames.
 
-    A distance or angle that rounding errors explain is left out.
+    The text contains no distance and no angle that rounding errors can explain.
     """
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
@@ -145,9 +145,8 @@ def far_frames(sameness: Sameness) -> list[Interval]:
 def frames_heading(sameness: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The table contains the distances after model B was changed to match model A. The verdict "same up to
-    single precision" compares the unchanged models. For this verdict, the heading therefore lists the changes
-    of model B.
+    The table shows the distances after the changes of model B in `sameness.after`. The verdict "same up to
+    single precision" is about the unchanged models. After this verdict, the heading lists the changes.
     """
     changed = (
         f", after changes of {', '.join(sameness.up_to)}" if sameness.up_to_single and sameness.up_to else ""
@@ -160,10 +159,10 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between matching frames of model A and the unchanged model B.
+    """Describe the largest distance between a frame of model A and the matching frame of model B as given.
 
-    The text is empty in two cases: model B needs no changes to match model A, or rounding errors explain the
-    distance.
+    The text is empty if rounding errors explain the distance. The text is also empty if `sameness.after` is
+    empty, which means that no change brings model B closer to model A.
     """
     frame = sameness.as_written
     off = "" if frame is None else _off(frame, sameness.rounding)
@@ -173,8 +172,8 @@ def describe_as_written(sameness: Sameness) -> str:
 def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
-    The text contains the nonzero coordinates of model A. The text also contains the nonzero coordinates of
-    those joints of model B that match no independent joint of model A.
+    The text contains the nonzero coordinates of model A. A joint of model B may have no matching independent
+    joint in model A. The text contains the nonzero coordinate of such a joint too.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -296,9 +295,10 @@ def as_document(sameness: Sameness) -> TextDocument:
 
 
 def distance_text(frame: Interval) -> str:
-    """Describe the distance of two frames in the worst configuration.
+    """Return the distance of two matching frames in the worst configuration, as text with a unit.
 
-    If the lower bound of the distance is 0, the text is the angle. If the angle is also 0, the text is empty.
+    If the distance is 0, return the angle between the frames instead. If the angle is 0 too, return an empty
+    text.
     """
     if frame.lower:
         return length(frame.lower)
@@ -344,7 +344,7 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 #: `HALF` is half the side length of a picture, in units of the SVG.
-#: `FILLED` is the fraction of the side length that the robots fill.
+#: The drawn robots are `FILLED` times as wide or as high as the picture.
 HALF, FILLED = 150.0, 0.9
 #: Maximum length of the scale bar, relative to the side length of a picture.
 MAX_SCALE_BAR = 0.3
@@ -407,10 +407,11 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    Without `worst`, the robots are in the zero configuration. If `written` is True, model B is drawn as
-    given. Otherwise, model B is drawn after the changes that make model B equivalent to model A. Each line is
-    four numbers: x and y of the start point, and x and y of the end point. Each picture has the lines of A
-    and the lines of B. The enlarged picture also has a line between the two frames.
+    Without `worst`, the robots are in the zero configuration. If `written` is True, model B has the base pose
+    of the given file. If `written` is False, model B has the base pose `sameness.base`, which brings model B
+    closest to model A. Each line is four numbers: x and y of the start point, and x and y of the end point.
+    Each picture has the lines of A and the lines of B. In the enlarged picture, another line connects the
+    origins of the worst frame in A and in B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -458,8 +459,7 @@ def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The first row is the direction in space that points to the right on the page.
-    # The second row is the direction that points down on the page.
+    # Matrix that projects a point in space to x and y in the picture: x points to the right, y points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

@@ -1,7 +1,7 @@
 """Report on a terminal: tables and failures.
 
-A terminal with less than 100 columns shows two tables; a wider terminal shows one wide table. The words
-contain all information that the colours show.
+A terminal with less than 100 columns shows two tables; a wider terminal shows one wide table. Colours only
+repeat information that the words contain.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ _WIDE = 100
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report.
 
-    For each failed check, print the command that computes the worst case again. With `cases`, print the
-    command for every check, failed or not.
+    The report contains a command for each failed check, which computes the worst result again. If `cases` is
+    True, the report contains such a command for every check.
     """
     robots = document["robots"]
     out.print(

@@ -77,7 +77,7 @@ def format_ratio(ratio: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value; None means infinity."""
+    """Return the largest value. None stands for infinity: if a value is None, the result is None."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -100,7 +100,7 @@ def checks_in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def quantities_by_heading(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities in each column of the robots' table; the keys are the column headings."""
+    """Return the column headings of the table of robots, each with the quantities in this column."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].heading if name in QUANTITIES else name
@@ -173,9 +173,9 @@ def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[
 
 
 def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
-    """Return the cells of one row; `second_oracle_heads` returns the headings of these cells.
+    """Return a row of the table about the second oracle. `second_oracle_heads` returns the headings.
 
-    Each ratio is the largest (disagreement / bound) of all `checks`.
+    A ratio in a cell is the largest "disagreement / bound" of all `checks`.
     """
     checks = [check for check in checks if "second_oracle" in check]
     found = [check["second_oracle"] for check in checks]

@@ -48,8 +48,8 @@ from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_r
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
-#: The study omits angles about fixed axes.
-#: The Jacobian of these angles has the same rows as a Jacobian of Euler angles, in reverse order.
+#: The study omits the representations by angles about fixed axes.
+#: The Jacobian of such angles has the same rows as a Jacobian of Euler angles, in reverse order.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -97,8 +97,8 @@ def accuracy_study(
     `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
     `base`, the root link is fixed.
 
-    Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians
-    from the rotation and the Jacobian of each library (eq. 7.122).
+    Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
+    eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
     """
     drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
@@ -202,10 +202,10 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices (n, links, m) of the nonzero columns of each link's Jacobian.
+    """Return the indices (n, links, m) of the nonzero columns in the Jacobian of each link.
 
-    m is the largest number of nonzero columns of a Jacobian. If a Jacobian has fewer than m nonzero columns,
-    the last indices of this Jacobian belong to zero columns.
+    The Jacobian with the most nonzero columns has m nonzero columns. For another Jacobian, the indices of its
+    nonzero columns come first, and indices of zero columns follow.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

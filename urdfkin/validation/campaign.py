@@ -1,4 +1,7 @@
-"""The function `validate`: split the work into chunks, run the chunks on an engine, and make the report."""
+"""Validate robots: compare urdfkin's results with Pinocchio's results, and return a report.
+
+The function `validate` splits the work into chunks. An engine runs the chunks.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A file of a store is damaged; the chunk of this file is computed again."""
+    """A file in the folder of a store is damaged; urdfkin computes the lost results again."""
 
 
 def validate(
@@ -68,9 +71,9 @@ def validate(
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
-        samples: Number of random configurations within the limits for each robot. The neutral configuration,
-            the lower limits and the upper limits are added. Every eighth sample has joint velocities and
-            joint accelerations a hundred times larger.
+        samples: Number of random configurations within the limits for each robot. `validate` also compares
+            the results for the neutral configuration, the lower limits and the upper limits. Every eighth
+            sample has joint velocities and joint accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
         jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
             process. Other robots are not affected.
@@ -88,8 +91,8 @@ def validate(
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
-        retry: "failed": check again the robots that an earlier run could not check. The files of these robots
-            may have changed since the earlier run.
+        retry: "failed": try again to check the robots that an earlier run could not check. A failed robot's
+            file may have changed since the earlier run.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
@@ -153,7 +156,8 @@ def validate(
                 if any(True for _ in collector.missing_chunks(i))
             ]
             if _should_compile(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
-                # If a worker compiled the kernels, the compilation would count as a robot's computing time.
+                # Load or compile the kernels before the workers start.
+                # The computing time of a robot then does not contain the compilation.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
@@ -228,8 +232,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: A run with more than _WORTH_LOADING samples is faster with compiled kernels if all kernels are on disk.
-#: A run with more than _WORTH_COMPILING samples is faster even if the run must first compile the kernels.
+#: If all kernels are on disk, compiled kernels make runs with more than _WORTH_LOADING samples faster.
+#: If kernels are missing on disk, compiling them makes runs with more than _WORTH_COMPILING samples faster.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

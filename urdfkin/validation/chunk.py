@@ -121,7 +121,8 @@ class Timings:
 class ChunkResult:
     """Result of a chunk, or the sum of the results of adjacent chunks of one robot.
 
-    `summary` is None if the first chunk is not included.
+    `summary` describes the robot. Only the first chunk of a robot computes the summary. Without the result of
+    this chunk, `summary` is None.
     """
 
     name: str
@@ -231,7 +232,10 @@ class _ComparisonBatch:
 
 
 class _Block(_ComparisonBatch):
-    """The comparisons for a block of frames, and for each joint whose child link is in the block."""
+    """Comparison of a block of frames with the oracles.
+
+    Results for a joint are compared in the block of the joint's child link.
+    """
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
@@ -254,8 +258,9 @@ class _Block(_ComparisonBatch):
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
         """Yield error statistics for the frames and the joints of the block.
 
-        For a joint, urdfkin's result is the result for the joint's child link. Pinocchio computes the joint
-        and the child link with different functions, so both results are compared.
+        The frame of a joint is the frame of its child link, so urdfkin computes one result for both.
+        Pinocchio has different functions for joints and for links. Therefore, urdfkin's result is compared
+        with the results of both functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():
@@ -337,7 +342,10 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert configurations of `tree` to configurations of `free`, the same tree without mimic rules."""
+    """Convert configurations of a tree with mimic joints to configurations of the tree `free`.
+
+    In the tree `free`, the same joints have no mimic rules, so each mimic joint has its own coordinates.
+    """
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -38,9 +38,9 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: Maximum number of sent chunks without an answer: _PER_THREAD * threads + _MORE.
+#: At most _PER_THREAD * threads + _MORE chunks are sent and not answered at any time.
 #: The number of threads is the sum over all workers.
-#: With this number of chunks, no thread waits for a chunk.
+#: The limit is high enough that every thread always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A high number is safe, because a robot cannot crash a Dask worker.
@@ -48,7 +48,8 @@ _PER_THREAD, _MORE = 2, 4
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
-#: If the scheduler has one of these packages, its version must equal the version in this process.
+#: The scheduler needs none of these packages.
+#: But if a package is installed there, the scheduler and this process must have the same version.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -114,9 +115,9 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class of a scheduler and a worker without a web server.
+    """Base class of a scheduler and a worker that do not start Dask's web server.
 
-    All users of the machine could open the web page of Dask.
+    Every user of the machine could read the pages of the web server.
     """
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
@@ -134,8 +135,9 @@ class _ClusterWorker(_Portless, Worker):
 def _without_ports(number: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers that run in this process and open no port.
 
-    Dask adds its scratch folders to the front of `sys.path`. These folders are in a temporary folder that
-    only this user can access, and `sys.path` is restored before any further import.
+    Dask adds its scratch folders to the front of `sys.path`, so another user could place modules there. Two
+    measures prevent this: only the current user can access the scratch folders, and this function removes the
+    folders from `sys.path` at once.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -166,7 +168,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 def _check_versions(client: Client) -> None:
     """Raise ClusterError if a worker or the scheduler has other versions than this process.
 
-    The caller must not send anything to the cluster before this check.
+    Call this function before any data are sent to the cluster.
     """
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
@@ -227,7 +229,7 @@ class Cluster:
                         continue
                     try:
                         completed.add(self._send(task, 1))
-                    except (UrdfkinError, OSError) as error:  # The text of the robot cannot be read.
+                    except (UrdfkinError, OSError) as error:  # The file of the robot cannot be read.
                         failed.add(task.robot)
                         on_answer(task, make_failure(task.chunk.robot_input, error))
                 if not self._pending:
@@ -265,7 +267,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Delete a robot's text on the workers if no sent chunk of this robot waits for an answer."""
+        """Count an answer. If all sent chunks of the robot are answered, delete its text on the workers."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

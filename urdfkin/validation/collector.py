@@ -30,7 +30,7 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: Number of finished chunks from an earlier run.
-        failures: Number of robots so far that have a disagreement or could not be checked.
+        failures: Number of robots that already have a disagreement, or that could not be checked.
     """
 
     robots_done: int
@@ -129,9 +129,9 @@ class _RobotAnswers:
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
-        """Insert the result of a range of chunks.
+        """Store the result of a range of chunks.
 
-        The results of adjacent chunks and the new result are replaced by their sum.
+        If a stored result belongs to the chunks directly before or after, store the sum of the results.
         """
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
@@ -160,8 +160,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # The results after a failed chunk are left out.
-        # The number of these results depends on the speed of the workers.
+        # If a chunk failed, the report contains only the results of the chunks before the failed chunk.
+        # The number of finished chunks after the failed chunk depends on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -2,9 +2,9 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. A mistake is reported if the mistake makes the largest difference at least a
-thousand times smaller. If no mistake explains the whole result, the module reports mistakes in single columns
-of a Jacobian. At most three mistakes are reported.
+results with the user's results. If the largest difference is now at least a thousand times smaller, the
+module reports the mistake. If no mistake explains the whole result, the module reports mistakes in single
+columns of a Jacobian. At most three mistakes are reported.
 """
 
 from __future__ import annotations
@@ -26,18 +26,17 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake is applied to urdfkin's results, and the difference from the user's results is computed again.
-#: The mistake explains the user's results if at most this fraction of the original difference remains.
+#: A mistake explains the user's results if `Diagnosis.remainder` is at most this number.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
-#: Number of configurations in a fast first test for exchanged joints.
-#: The other configurations are compared only if an exchange explains the results of the first test.
+#: A fast first test for exchanged joints uses only this number of configurations.
+#: If an exchange of two joints explains these results, a second test uses all configurations.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
-#: Row indices that exchange the linear and the angular rows of a six-vector.
+#: Indices that change the rows [linear; angular] of a result to [angular; linear], and vice versa.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -51,7 +50,9 @@ class Diagnosis:
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
-        scale: Scale of each number in `expected`. The bound of a number is k * eps * scale.
+        actual: Results of the user's function.
+        expected: urdfkin's results.
+        scale: Scale of each number in `expected`. The bound on a rounding error is k * eps * scale.
         compute: Function that returns urdfkin's results for inputs, a frame and a reference frame.
     """
 
@@ -62,10 +63,12 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the largest difference with a mistake, divided by the largest difference without a mistake.
+        """Return the fraction of the user's largest error that a supposed mistake does not explain.
 
-        `predicted` contains urdfkin's results with the mistake, for the first n configurations. If n is None,
-        `predicted` contains the results for all configurations.
+        `predicted` contains urdfkin's results after the mistake was applied to them. The fraction is the
+        largest difference between the user's results and `predicted`, divided by the largest difference
+        between the user's results and urdfkin's results. If n is given, `predicted` and the fraction are
+        only for the first n configurations.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -108,7 +111,8 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A sentence about a common mistake, and a function that returns urdfkin's results with this mistake.
+#: A common mistake: a sentence that describes the mistake, and a function without arguments.
+#: The function applies the mistake to urdfkin's results, and returns the changed results.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -250,9 +254,9 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is_angle) for each joint with one coordinate.
+        """Return (name, index in q, index in v, is_angle) for each independent joint with one coordinate.
 
-        q and v are in the order of the function's convention.
+        The indices apply to the vectors q and v that the user's function receives.
         """
         tree = self.robot.tree
         found = []
@@ -269,9 +273,10 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply the numbers of some joints in the first `count` inputs by `factor`.
+        """Return the inputs q, v and a, in which the numbers of some joints are multiplied by `factor`.
 
-        `at` contains the index in q and the index in v of each of these joints.
+        `at` has a pair for each joint: the index in q, and the index in v and a. For `count` 1, only q
+        changes; for 2, q and v change; for 3, q, v and a change.
         """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
@@ -413,9 +418,9 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield a sentence for each column that has the opposite sign, is zero or equals a different column.
+    """Yield a sentence for each wrong column that has the opposite sign, is zero, or equals another column.
 
-    The number before each sentence is the remainder, which is 0.0 for these mistakes.
+    Each sentence is in a pair with its `Diagnosis.remainder`. The number is always 0.0.
     """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return

@@ -40,9 +40,9 @@ class ReportedMimic(TypedDict):
 
 
 class ReportedRange(TypedDict):
-    """The part of a joint's range in which all mimic joints of this joint are within their limits.
+    """The values in a mimicked joint's range at which all its mimic joints are within their limits.
 
-    Both ends are null if at most one joint value keeps the mimic joints within their limits.
+    `lower` and `upper` are null if these values are no interval: there is only one such value, or none.
     """
 
     lower: Annotated[float | None, doc("Lower end, rad or m; null: at most one joint value is allowed.")]
@@ -206,7 +206,7 @@ class Chain(TypedDict):
 
 
 class ReportedErrors(TypedDict):
-    """Errors of one library: differences from values with fifty digits, in eps * scale."""
+    """Errors of one library, in eps * scale. An error is the difference from a value with fifty digits."""
 
     worst: Annotated[float, doc("Largest error.")]
     typical: Annotated[float, doc("Root mean square of the errors.")]
@@ -261,7 +261,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Number of results in which one library differs and the other two agree, for each of three libraries."""
+    """Numbers of results for which exactly one of three libraries differs, and the other two agree."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]
@@ -269,7 +269,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison with a second oracle (a third library). Without a second oracle, this entry is missing."""
+    """Comparison with a second oracle, a third library. The entry exists only if there is a second oracle."""
 
     by: Annotated[str, doc("Name of the second oracle: mujoco.")]
     urdfkin: ReportedOraclePair

@@ -1,9 +1,9 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers,
-so no result depends on the engine. If the answer of a chunk is a `Failure`, an engine may skip the remaining
-chunks of the same robot. The engine must run all other chunks. Tasks are created only when they are needed,
-so a million tasks take no memory.
+An engine runs tasks, and passes the answer of each task to a callback. The order of the answers does not
+matter: the collector sorts the answers, so no result depends on the engine. If the answer of a chunk is a
+`Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
+Tasks are created only when they are needed, so a million tasks take no memory.
 
 Different workers get chunks of different robots, so that most robots are read by one worker only. If no robot
 is waiting, a free worker takes chunks of the robot with the most remaining chunks.
@@ -33,12 +33,15 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Callback that receives the answer of a task, at most once for each task.
+#: Function that an engine calls with a task and its answer. A task has at most one answer.
 AnswerCallback = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
-    """Interface of an engine; an exception from `run` ends the validation, but earlier answers are kept."""
+    """Interface of an engine.
+
+    If `run` raises an exception, the validation ends. The answers of finished tasks are kept.
+    """
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None: ...
 
@@ -97,7 +100,10 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 class RobotTasks:
-    """The remaining tasks of a robot; `index` is the index of the chunk that was taken last."""
+    """Iterator over the tasks of a robot.
+
+    `robot` is the index of the robot, and `index` is the index of the latest chunk. Both are -1 at first.
+    """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self.robot = self.index = -1
@@ -125,9 +131,9 @@ class WorkQueue:
         self._removed_robots = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, and the remaining tasks of the same robot.
+        """Return a task for an idle worker, and the iterator over the remaining tasks of the task's robot.
 
-        New robots come first.
+        Robots that no worker has started come first. Return None if there is no task for the worker.
         """
         for tasks in self._waiting:
             self._started_robots.append(tasks)
@@ -139,7 +145,7 @@ class WorkQueue:
         return None
 
     def next(self, tasks: RobotTasks) -> Task | None:
-        """Return the next task of a robot; None if no task is left, or if the robot was removed."""
+        """Return the next task of a robot. Return None if the robot has no more tasks or was removed."""
         task = next(tasks, None)
         if task is None or task.robot in self._removed_robots:
             if tasks in self._started_robots:

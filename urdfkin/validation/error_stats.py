@@ -48,7 +48,8 @@ class CrossCheck:
     """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
-        alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
+        alone: Numbers of results for which one library differs and the other two agree. The numbers belong to
+            the libraries in the order of `CROSS_CHECKED`.
         undecided: Number of results without a majority. Either no two libraries agree, or one library
             agrees with both others, but these two disagree.
     """
@@ -85,9 +86,9 @@ def make_cross_check(
     first: Bound,
     second: Bound,
 ) -> CrossCheck:
-    """Compare three results (n, frames, ...) with each other.
+    """Compare the results (n, frames, ...) of urdfkin, Pinocchio and the second oracle in pairs.
 
-    `first` is the bound on the difference between urdfkin and Pinocchio. `second` is the bound on the
+    The argument `first` bounds the difference between urdfkin and Pinocchio. The argument `second` bounds the
     difference between urdfkin and the second oracle.
     """
     if not results.size:
@@ -118,7 +119,7 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale. The factor k of the sum is the factor k of `second`."""
+    """Return the sum of two bounds k * eps * scale, as a bound with the factor k of `second`."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -155,10 +156,11 @@ class ErrorStats:
         results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
         bound_ratio: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
-            adjacent edges, and above the last edge.
-        worst_by_frame: The largest disagreement of each frame, in the robot's order.
-        bounds: The smallest and the largest bound of all results, in eps * scale.
+        histogram: (82,) numbers of results, one for each bin. `HISTOGRAM_EDGES` separates the bins. The first
+            bin is below the first edge, and the last bin is above the last edge.
+        worst_by_frame: The largest disagreement of each frame, in eps * scale. The frames have the same order
+            as in the robot.
+        bounds: Each result has its own bound. These are the smallest and the largest bound, in eps * scale.
     """
 
     results: int
@@ -186,7 +188,7 @@ class ErrorStats:
         )
 
     def join_frames(self, other: ErrorStats) -> ErrorStats:
-        """Return the statistics for all frames of `self` and `other`; both must have the same samples."""
+        """Add the statistics of other frames. The samples of both statistics must be the same."""
         joined = replace(self, worst_by_frame=()) + replace(other, worst_by_frame=())
         return replace(joined, worst_by_frame=self.worst_by_frame + other.worst_by_frame)
 

@@ -46,7 +46,7 @@ _BATCH_SIZE = 256
 _DIAGNOSIS_SAMPLES = 48
 #: Maximum number of stored messages about exceptions and wrong shapes.
 _MAX_MESSAGES = 5
-#: Rounding to single precision can explain relative differences up to this value.
+#: A relative difference up to this value can be the effect of rounding to single precision.
 _SINGLE_PRECISION = 1e-5
 
 
@@ -77,7 +77,10 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Return a sentence about the number with the largest ratio of difference to bound."""
+        """Describe the worst number of this result.
+
+        The worst number has the largest ratio of difference to bound.
+        """
         with np.errstate(all="ignore"):
             over = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -106,12 +109,13 @@ class FunctionCheck(Displayable):
         compared: Number of results that have the right shape.
         factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
-        bound_ratio: Largest value of difference / (bound * factor); at most 1 if all results agree.
-        oracle_bound_ratio: Largest value of difference / (bound * factor), where the difference is between
-            the function and the oracle. None without an oracle.
-        rows: Largest ratio in each row of the result; the key is the name of the row.
-        columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
-            for other quantities.
+        bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference
+            bound * factor. The ratio is at most 1 if all results agree.
+        oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of bound * factor. None
+            without an oracle.
+        rows: `bound_ratio` of each row of the result, by the name of the row.
+        columns: `bound_ratio` of each column of a Jacobian, by the name of the joint velocity. Empty for
+            other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception or a wrong shape.
         first_errors: The first exceptions and wrong shapes, with messages.
@@ -210,7 +214,7 @@ class FunctionCheck(Displayable):
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
     def _list_first_errors(self) -> Iterator[str]:
-        """Yield a line for each message in `first_errors`, with the samples that have this message."""
+        """Yield a line for each different message in `first_errors`, with the indices of its samples."""
         for message in dict.fromkeys(error.message for error in self.first_errors):
             samples = [str(error.sample) for error in self.first_errors if error.message == message]
             yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
@@ -261,11 +265,11 @@ def verify_function(
 ) -> FunctionCheck:
     """Compare the results of your function with the results of urdfkin and of the oracle.
 
-    The allowed difference is a derived bound on rounding errors. The function receives q (nq,), and v and a
-    (nv,) if the quantity needs them, in rad, m and s. The values are random within the limits; the zero
-    configuration and the joint limits come first. In every eighth sample, v and a are a hundred times larger,
-    so that quadratic terms have a visible effect. If the function raises an exception or returns a wrong
-    shape, the check reports this and continues.
+    The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
+    quantities, and v (nv,) and a (nv,) for some quantities. The units are rad, m and s. The values are random
+    within the limits; the zero configuration and the joint limits come first. In every eighth sample, v and a
+    are a hundred times larger, so that quadratic terms have a visible effect. An exception or a result of
+    wrong shape does not end the check. The check reports the exceptions and wrong shapes.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -278,10 +282,11 @@ def verify_function(
             accepts. None: urdfkin's convention.
         samples: Number of random configurations.
         seed: Seed of the random configurations.
-        factor: Number by which the bound is multiplied. The bound is derived for a recursion from joint to
-            joint; give a factor above 1 for a method with larger rounding errors.
-            `FunctionCheck.smallest_factor` is the smallest factor with which the check passes.
-        batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
+        factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
+            for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
+            errors. `FunctionCheck.smallest_factor` is the smallest factor with which the check passes.
+        batch: If True, the function computes n configurations in one call. The function then receives
+            q (n, nq), v (n, nv) and a (n, nv), and returns n results.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
 
@@ -289,7 +294,7 @@ def verify_function(
         The result; `print` shows it. In a test: `assert check.agrees, check`.
 
     Raises:
-        UnknownNameError: no such quantity, frame or convention.
+        UnknownNameError: urdfkin does not know the quantity, the frame or the convention.
         InputError: an argument is invalid, or urdfkin cannot check the quantity in this convention.
         VerificationError: urdfkin and the oracle disagree.
 
@@ -334,11 +339,12 @@ class _FunctionResults:
     """The results of the user's function and of urdfkin for a batch of configurations.
 
     Attributes:
-        valid_indices: Indices of the n configurations with a result of the right shape.
+        valid_indices: Indices of n configurations. For these configurations, the user's function returned a
+            result of the right shape.
         actual: The function's results (n, ...).
         expected: urdfkin's results (n, ...).
-        scale: For each number in `expected`, the scale in its bound k * eps * scale.
-        k: (n,) for each result, the factor k in its bound k * eps * scale.
+        scale: The bound on a difference is k * eps * scale. Each number in `expected` has a scale.
+        k: (n,) the factor k of the bound, one for each configuration.
     """
 
     first: int
@@ -526,11 +532,11 @@ class _Run:
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
         """Return a bound on the rounding error of the conversion, in eps * scale.
 
-        If the conversion only reorders numbers, the bound is 0. Any other conversion rounds each joint angle
-        before the angle is passed to the user's function. The rounded angle differs from urdfkin's angle by
-        up to 2 eps |q|, so the joint's rotation matrix has an error of up to 2 eps |q|. Each term of the
-        result is a product of rotated vectors, and each joint may rotate each of these vectors. The error of
-        a vector is therefore at most the sum of the errors of all rotation matrices. The matrix that
+        A conversion that only reorders numbers has no rounding errors. A conversion that computes, for
+        example degrees from radians, rounds each joint angle. The rounded angle differs from urdfkin's angle
+        by up to 2 eps |q|, so the joint's rotation matrix has an error of up to 2 eps |q|. Each term of the
+        result is a product of `factors` vectors. Each of these vectors is rotated by at most all joints. The
+        error of a vector is therefore at most the sum of the errors of all rotation matrices. The matrix that
         converts the velocities of a planar or floating joint adds at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
@@ -542,7 +548,11 @@ class _Run:
     def _call_function(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Return the results that have the right shape, and the indices of their configurations."""
+        """Call the user's function for a batch of configurations.
+
+        Return the results that have the right shape, and the indices of the configurations with such a
+        result.
+        """
         n = len(inputs[0])
         if self.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
@@ -567,7 +577,7 @@ class _Run:
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
             return
-        if total.bound_ratio <= 1.0:  # No difference is too large, so no difference needs an explanation.
+        if total.bound_ratio <= 1.0:  # All differences are within their bounds.
             return
         if total.eps_scale * EPS <= _SINGLE_PRECISION and math.isfinite(total.bound_ratio):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
@@ -671,7 +681,10 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Call the function and return a copy of its result, or add its error to `total` and return None."""
+    """Call the function, and return a copy of the result.
+
+    If the call fails or the result is not valid, add a message to `total` and return None.
+    """
     try:
         result = function(*inputs)
         if result is None:

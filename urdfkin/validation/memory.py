@@ -1,11 +1,12 @@
 """Limit the memory of a validation, and estimate the memory that a robot needs.
 
 Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
-samples * frames * 6 * nv numbers. The division into blocks changes no result of a frame, and therefore does
-not change the report.
+samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
+results do not depend on the other frames.
 
-All processes of a validation together use at most half of the memory that is free at the start. A robot that
-needs more memory is not verified; the reason states the needed and the allowed memory.
+All processes of a validation together use at most half of the memory that is free at the start. Each process
+gets an equal part of this memory. If a robot needs more memory than a process has, the robot is not verified.
+The report then states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum number of bytes of one array in a block of frames.
-#: Up to _ARRAYS arrays of this size exist at the same time.
+#: Maximum number of bytes of one array with the results of a block of frames.
+#: At most _ARRAYS such arrays are in memory at the same time.
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
@@ -46,14 +47,17 @@ def frame_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; yield at least one slice."""
+    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`.
+
+    A slice contains at least one item, even if the item is larger. For zero items, yield one empty slice.
+    """
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
         yield slice(start, min(count, start + most))
 
 
 def estimate_bytes(tree: KinematicTree, samples: int) -> int:
-    """Estimate the largest memory (bytes) that a check of a robot needs."""
+    """Estimate the peak memory (bytes) of a process while it compares the results for a robot."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
     return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))

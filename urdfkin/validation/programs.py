@@ -224,7 +224,10 @@ class Program:
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Return an answer that has a result or the text of an error."""
+        """Parse the program's answer.
+
+        Raise ProgramError unless the answer contains an entry `result`, or an entry `error` that is a text.
+        """
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):

@@ -1,9 +1,10 @@
 """Functions that run on the machines of a cluster.
 
-Dask's worker computes nothing. A chunk runs in a separate process, so a robot can only crash this process,
-not the worker. A chunk that crashes its process is tried a second time in a new process. If the second
-process crashes too, the robot's result is "not verified" with the signal as the reason. Chunks and answers
-are transferred as bytes. The text of a robot is sent only once for all chunks of the robot.
+Dask's worker computes nothing. The worker starts a separate process for the chunks, so a robot can crash this
+process, but not the worker. If a chunk crashes the process, the worker runs the chunk again in a new process.
+If the new process crashes too, the robot's result is "not verified"; the reason is the signal or exit status.
+Chunks and answers are transferred as bytes. A chunk does not contain the text of the robot. The text is sent
+separately, so that it is not sent again with every chunk.
 """
 
 from __future__ import annotations
@@ -20,11 +21,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run`: a word, and data that depend on the word.
-#: After the word "answer", the data are the pickled answer.
-#: After the word "died", the data are the signal or exit status of the chunk's second crash.
-#: After the words "other code", the data are the worker's versions and digests.
-#: The worker returns "other code" if its versions or digests differ from the client's.
+#: Return value of `run` for a chunk: a pair of a word and data.
+#: "answer": the chunk was computed; the data are the pickled answer.
+#: "died": the chunk crashed two processes; the data name the signal or exit status of the second crash.
+#: "other code": the worker's versions or digests differ from the client's; the data are the worker's.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -82,7 +82,10 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _idle_or_new() -> WorkerProcess:
-    """Return an idle process, which may already have read the robot, or a new process."""
+    """Return an idle process; without an idle process, start a process.
+
+    The robot of the next chunk may already be in the memory of an idle process.
+    """
     with _lock:
         while _idle:
             process = _idle.pop()

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that only display results; the code of these packages may change during a campaign.
+#: Packages that display results, but compute no results. Their code may change during a campaign.
 _DISPLAY = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -212,8 +212,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The commands that repeat the run, one on each line.
 
-        Robots with the same options share a command. A command reads at most one robot from standard input.
-        Therefore, a command has at most one robot that was passed as text.
+        Robots with the same options share a command. If the user passed a robot as text, a command must read
+        this robot from standard input. A command can read only one such robot.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
@@ -228,7 +228,7 @@ class ValidationReport(Displayable):
 
     @property
     def passed(self) -> bool:
-        """Whether at least one robot was requested, and every requested robot was verified."""
+        """Whether every requested robot was verified; False if no robot was requested."""
         return self.outcome.passed
 
     @property

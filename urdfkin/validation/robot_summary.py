@@ -83,7 +83,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
 def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which the joint's mimic joints are within their limits.
 
-    Return None if this part is the whole range.
+    Return None if the mimic joints are within their limits in the joint's whole range.
     """
     if narrowed is None:
         return None
@@ -98,7 +98,10 @@ _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
-    """Return each chain as plain data for JSON; without `oracle` (Pinocchio), no table is checked."""
+    """Return the chains with their Denavit-Hartenberg tables, as plain data for JSON.
+
+    The oracle Pinocchio checks the tables. If `oracle` is None, the tables are not checked.
+    """
     found = []
     for limb, base, tip in _chains(robot):
         try:

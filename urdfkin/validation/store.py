@@ -11,9 +11,10 @@ The manifest defines the robots, the samples, the versions, the chunks and the k
 the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts or options
 are never reused.
 
-Files are written atomically, so a file is either complete or absent. The store reports damaged files, and
-files whose names belong to no chunk. A store that is open for writing moves these files to `damaged/`. The
-chunk of a damaged file is computed again.
+Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
+chunk. The store reports damaged files, and files whose names contain no key of the manifest. A store that is
+open for writing also moves the reported files to the folder `damaged/`. The results in a damaged file are
+computed again.
 """
 
 from __future__ import annotations
@@ -157,7 +158,10 @@ def _describe_robot(robot: tuple[Origin, str]) -> str:
 
 @dataclass(frozen=True)
 class Store:
-    """Folder of a stored validation; `scratch` is a folder for unfinished files, or None for reading only."""
+    """A folder that contains the results of a validation.
+
+    `scratch` is a folder for unfinished files. If `scratch` is None, the store can only be read.
+    """
 
     folder: Path
     manifest: Manifest
@@ -201,7 +205,10 @@ class Store:
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files whose names belong to no chunk, such as renamed files, and move them to `damaged/`."""
+        """Report files whose names contain no key of the manifest, and move the files to `damaged/`.
+
+        For example, somebody may have renamed a file.
+        """
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -295,8 +302,9 @@ def open_store(
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock the store for writing.
 
-    If `shard` is given, such as "2/4", other processes may write other shards. With `retry_failed`, stored
-    failures are deleted, because the files of the failed robots may have changed.
+    Without `shard`, only this process can write to the store. With the shard "2/4", other processes can write
+    the shards "1/4", "3/4" and "4/4" at the same time. With `retry_failed`, stored failures are deleted,
+    because the files of the failed robots may have changed.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -333,9 +341,9 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether this path may belong to a store that has no manifest yet.
+    """Return whether a file or folder may belong to a store, although the store has no manifest yet.
 
-    The process of another shard creates locks and folders before it writes the manifest.
+    Several processes may create one store. A process creates locks and folders before the manifest.
     """
     return path.name in (_SCRATCH, _CHUNKS) or path.name.startswith(_LOCK)
 
@@ -343,9 +351,9 @@ def _is_ours(path: Path) -> bool:
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Return the store with its manifest.
 
-    If the folder has no manifest, the manifest is written. If `retry_failed` is True and only the files of
-    failed robots have changed, the manifest is replaced. In all other cases, the folder keeps the old
-    manifest, because the old manifest contains the original start time.
+    There are three cases. If the folder has no manifest, the manifest is written. If robots' files have
+    changed and all these robots have failed, `retry_failed` replaces the manifest. Otherwise, the two
+    manifests must agree; the old manifest remains, because it contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -404,7 +412,7 @@ def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # A process that only tests the lock holds the lock for a moment.
+        time.sleep(0.1)  # To test whether the lock is free, another process may hold the lock for a moment.
     raise InputError(
         "another process uses this store",
         where=str(folder),
@@ -472,10 +480,9 @@ class AccuracyStore:
 
     @classmethod
     def from_store(cls, store: Store) -> AccuracyStore | None:
-        """Return the accuracy results in a store.
+        """Return the accuracy results in a store; None if there are no accuracy results.
 
-        Return None if the store has no accuracy results. Return None with a message to the user if the
-        settings of the accuracy study cannot be read.
+        If the settings of the accuracy study cannot be read, notify the user and return None.
         """
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:

@@ -1,9 +1,11 @@
-"""Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
+"""Write test vectors: configurations of a robot, and the results that a correct program computes for them.
 
-The file `robots/features.toml` defines small robots, each with one feature of URDF. For robots of the
-catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimal
-numbers in the URDF. Configurations are computed from SHA-256 digests of the robot's name, the names of joints
-and indices. Therefore, the vectors depend only on the URDF and the robot's name.
+The results are computed with at least 50 digits, and written with 17 digits. Each number has a tolerance.
+Test vectors name the robot's URDF file and the file's SHA-256. If the robot is not in the catalogue, its URDF
+file is written too. The file `robots/features.toml` defines small robots, each with one feature of URDF. All
+values are computed from the decimal numbers in the URDF. Configurations are computed from SHA-256 digests of
+the robot's name, the names of joints and indices. Therefore, the vectors depend only on the URDF and the
+robot's name.
 """
 
 from __future__ import annotations
@@ -59,13 +61,14 @@ from urdfkin.verify.quantities import (
 #: Programs that read version 1 can read all versions 1.x, but not version 2.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot; the first is the zero configuration.
-#: If the limits of a joint exclude zero, the first configuration has the joint at the limit nearest to zero.
+#: Number of configurations of each robot. The first configuration is the zero configuration.
+#: If a joint's limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
-#: Largest absolute value of velocities, of accelerations, and of positions of planar and floating joints.
+#: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
+#: Random positions of planar and floating joints are in the same interval.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
-#: A multiple of 1 / 1024 has at most ten decimals, and a double represents it without rounding.
+#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _GRID = 1024.0
 #: A tolerance is rounded to 12 digits, and then rounded up to 3 digits.
 #: The rounding to 12 digits removes the last digits, which differ between processors.
@@ -76,9 +79,9 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The classical and the spatial acceleration differ by the cross product of angular and linear velocity.
-#: The bound on the classical acceleration includes this product.
-#: Therefore, the bound is also valid for the spatial acceleration.
+#: The vectors use the error bound of the classical acceleration for the spatial acceleration too.
+#: The two accelerations differ by the cross product of angular and linear velocity.
+#: The error bound of the classical acceleration includes the error of this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -279,7 +282,10 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class VectorFiles:
-    """The files of one robot, and the number of values in each file of vectors."""
+    """The files that were written for one robot.
+
+    `numbers` is the number of expected values in the robot's test vectors.
+    """
 
     robot: str
     files: tuple[Path, ...]
@@ -311,7 +317,10 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 
 
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
-    """Write the test vectors of a robot's default tip, with its URDF if the robot is not in the catalogue."""
+    """Write the test vectors of a robot for the robot's default tip.
+
+    If the robot is not in the catalogue, also write its URDF.
+    """
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
         sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()
@@ -408,7 +417,8 @@ def _results(
 ) -> Iterator[dict[str, Any]]:
     """Yield the results of a sample.
 
-    A value is None if `digits` is too small to round the value to 17 significant digits.
+    A result is computed as an interval with `digits` digits. If the interval is too wide to round the result
+    to 17 significant digits, the value is None.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

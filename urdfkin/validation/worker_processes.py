@@ -2,9 +2,10 @@
 
 The crash of a process affects only the robot that this process validates. A worker process is a new Python
 interpreter. A worker imports neither the parent's main module nor modules of the current folder, so a script
-needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot. After
-a crash, the robot is tried once more, alone in a process, after all other robots. With `isolate`, each robot
-runs alone from the start, and the first crash is the robot's result.
+needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot. If a
+robot crashes a process, the remaining chunks of the robot run after all other robots, in a separate process.
+The crashed chunk then runs again.
+With `isolate`, each robot has a separate process from the start, and the first crash is the robot's result.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Close the worker's end of the pipe in this process.
-            # If the worker's end stayed open in this process, the pipe would stay open after the worker ends.
+            # Both processes have the worker's end of the pipe. Close this end in the parent process.
+            # The pipe then closes as soon as the worker ends.
             theirs.close()
 
     @property
@@ -146,15 +147,16 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    If `alone` is given, each process validates only one robot. If this process crashes, the report states the
-    text `alone` as the reason.
+    Without `alone`, a process validates one robot after another. With a text `alone`, each process validates
+    only one robot. If such a process crashes, the report states the text as the reason.
     """
 
     def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Tasks that will run again, for each robot that crashed a process.
+        #: Tasks of each robot that crashed a process: the task that crashed, and the remaining tasks.
+        #: These tasks run after the tasks of all other robots.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
