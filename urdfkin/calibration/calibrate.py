@@ -66,7 +66,7 @@ _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is unknown and no poses are measured, the target is assumed to be at (L/5, L/6, L/7).
+#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
 #: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
@@ -242,8 +242,8 @@ def calibrate(
         noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
-        full_poses: True if you will measure full poses; False if you will measure positions. If `poses` is
-            given, this argument has no effect.
+        full_poses: True if you will measure full poses; False if you will measure only positions. If `poses`
+            is given, this argument has no effect.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
             If joint values look like degrees, `force` has no effect: convert the values, or pass
@@ -300,7 +300,11 @@ def fit_model(
     write_all: bool = True,
     check: bool = True,
 ) -> Calibration:
-    """Return the calibration of a model, even if the fit is not plausible."""
+    """Return the calibration of a model, even if the fit is not plausible.
+
+    `calibrate` describes the arguments. If `check` is false, this function does not check whether the fit is
+    plausible.
+    """
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (

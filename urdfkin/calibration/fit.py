@@ -15,11 +15,11 @@ because the tool's orientation is unknown.
 
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
 has a column in the Jacobian. The remainder of a column is the column minus its projection onto the columns
-that are already chosen. A long remainder means that the column is nearly independent of the chosen columns. A
+that are already chosen. The longer the remainder, the more independent the column is of the chosen columns. A
 column is a candidate if its remainder is at least half as long as the longest remainder. Each step chooses
 the candidate that comes first in the model's order of preference. The parameter of the chosen column is
-fitted. Columns with short remainders are no candidates, because fitted parameters with nearly dependent
-columns can become very large. For example, fitted lengths along nearly parallel axes could be hundreds of
+fitted. Columns with shorter remainders are excluded, because fitted parameters with nearly dependent columns
+can become very large. For example, four fitted lengths along nearly parallel axes could be hundreds of
 metres, and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.

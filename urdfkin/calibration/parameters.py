@@ -186,7 +186,7 @@ ORIGIN_PARAMETERS = (
 )
 _ORIGIN_PARAMETER_NAMES = tuple(name for name, *_ in ORIGIN_PARAMETERS)
 #: Order of preference for the parameters of a revolute (True) or prismatic (False) joint.
-#: If several parameters have the same effect, the first of these parameters is fitted.
+#: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
 #: The first parameter changes the joint's zero, and the next parameters move the joint's axis.
 #: Further parameters move the joint's frame, but not its axis.
 #: The last parameter is the gain, which scales the joint's value.

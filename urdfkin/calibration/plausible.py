@@ -1,13 +1,13 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. A fit
-with a smaller error is refused if the error is a large fraction of the spread of the measured positions. A
-fit is also refused if the error is hardly smaller than the error of a fit of base and tool alone. Other
-reasons for a refusal are a large orientation error, a large tilt of a joint's axis, a large gain, missing
-redundancy, and joint values that look like degrees. To find the mistake behind a refused fit, the module
-corrects common mistakes in the data, one at a time, and fits again. If the fit is plausible after a
-correction, the corrected mistake is the likeliest one.
+joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. This
+limit is lower in two cases: if the error is also a large fraction of the spread of the measured positions,
+and if a fit of base and tool alone is almost as accurate. Other reasons for a refusal are a large orientation
+error, a large tilt of a joint's axis, a large gain, missing redundancy, and joint values that look like
+degrees. To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the
+data, one at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the
+likeliest one.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
 #: If a fit exceeds one of these limits, the module searches for common mistakes in the data.
-#: The first limit is the rms position error, as a fraction of the reach.
-#: The second limit is the rms orientation error, rad.
+#: The first limit is for the rms position error, as a fraction of the reach.
+#: The second limit is for the rms orientation error, rad.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5

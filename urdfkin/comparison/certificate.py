@@ -468,10 +468,10 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield an error message for each wrong bound of an interval in a certificate.
+    """Yield an error message for each bound of an interval in a certificate that is wrong or not proven.
 
-    `rounding` contains the distance (m) and the angle (rad) between matching frames that rounding errors can
-    cause. If `sharply` is true, the check may use branch and bound, a slow method.
+    `rounding` contains the distance (m) and the angle (rad) that rounding errors can cause between matching
+    frames. If `sharply` is true, the check may use branch and bound, a slow method.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

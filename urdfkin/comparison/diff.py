@@ -120,7 +120,8 @@ class Changes:
         sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: One effect for each joint whose changes move links. To compute the effect of a joint, urdfkin
-            changes this joint in the old version, and leaves all other joints unchanged.
+            changes this joint in the old version, and leaves all other joints unchanged. A joint whose effect
+            cannot be computed, such as a new joint, has no entry.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
         rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
             `changes` does not list this error. None if single precision does not explain all differences

@@ -63,7 +63,7 @@ class LibraryReading:
         missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
             the USD file) are listed.
         worst: Largest difference between two matching entries of link poses. The poses are relative to the
-            first common link. The value is 0 if the difference is at most the tolerance.
+            first common link. The value is 0 if rounding can explain the difference.
     """
 
     library: str
@@ -97,9 +97,9 @@ def compare_readers(
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or no installed library reads the file's format. A robot with
-            a locked joint causes the error. A robot from MJCF text instead of a file causes the error. A
-            robot from a USD file with a selected variant or articulation causes the error.
+        InputError: a library is not installed, or no installed library reads the file's format. The robot has
+            a locked joint, or was loaded from MJCF text instead of a file. The robot is from a USD file with
+            a selected variant or articulation.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)

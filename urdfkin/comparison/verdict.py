@@ -326,7 +326,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the distance (m) and the angle (rad) between matching frames that rounding can cause.
+        """Bound the distance (m) and the angle (rad) that rounding can cause between matching frames.
 
         `same` ignores a small rounding difference at each joint. These differences add up along the path. If
         an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
@@ -512,7 +512,8 @@ def _joints_fixed_in_one(
 ) -> set[int]:
     """Return the indices of the fixed joints of `tree` that are moving joints in `other`.
 
-    Two joints match if the joints have equal names, or if the child links of the joints have equal names.
+    Two joints match if they have equal names, or if their child links have equal names. `names` maps names of
+    joints in `tree` to the names in `other`, and `labels` contains the links' names.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -650,11 +651,12 @@ class JointComparison:
     rotation error of this frame. The multiplier and the offset of a mimic rule have a relative error of at
     most 2^-24.
 
-    In B, P may not be an ancestor of the link. P and the link are then on two branches, which begin at a
-    common ancestor of P and the link. Let W and E be the position error and the rotation error of the link
-    relative to this common ancestor. Let V and F be the position error and the rotation error of P relative
-    to the common ancestor. Let d be the distance between the link and P. Then the position error of the link
-    relative to P is at most W + V + F d. The rotation error of the link relative to P is at most E + F.
+    In B, P is not always an ancestor of the link. If P is not an ancestor, P and the link are on two branches
+    that begin at their last common ancestor. Let W and E be the position error and the rotation error of the
+    link relative to this common ancestor. Let V and F be the position error and the rotation error of P
+    relative to the common ancestor. Let d be the distance between the link and P. Then the position error of
+    the link relative to P is at most W + V + F d. The rotation error of the link relative to P is at most
+    E + F.
     `same` ignores the rounding errors of double precision, so these errors are added to the bounds. If both
     models are rounded, the bounds of both models are added.
 

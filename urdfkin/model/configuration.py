@@ -48,6 +48,7 @@ from urdfkin.model.tree import (
 
 #: Largest absolute value (rad or m) of a random joint value.
 #: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
+#: A random value of a continuous joint is between -pi and pi.
 #: Some upper bounds hold only if the joints without limits travel at most this distance (m) from zero.
 #: Such joints are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.

@@ -29,8 +29,8 @@ FloatArray = inputs.FloatArray
 class FrameName(str):
     """The name of a frame with a prefix, `link:NAME` or `joint:NAME`.
 
-    `LinkFrame("link:NAME")` always selects the link NAME. A plain string "link:NAME" can also be the full
-    name of a link or joint.
+    `LinkFrame("link:NAME")` always selects the link NAME, and `JointFrame("joint:NAME")` the joint NAME. A
+    plain string "link:NAME" can also be the full name of a link or joint.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')

@@ -302,7 +302,7 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield each pair of a joint axis at A's body and a joint axis of the same kind at B's body.
 
-    If A's axis is parallel to A's `reference` line, the function also yields the pairs at the next two
+    After a pair whose axis in A is parallel to A's `reference` line, the function continues at the next two
     bodies.
     """
     for e, f in _next_joints(mechanisms, via, bodies):

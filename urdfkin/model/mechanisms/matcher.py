@@ -100,10 +100,12 @@ class BodyPair:
 class MechanismMatcher:
     """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
 
-    Without `choices`, the matcher searches for the signs, zero offsets and conversions for which the largest
-    number of joints and links agrees. Without `base`, the matcher starts at A's root body. For each body of
-    B, the matcher then counts the link names that also occur in A's root body. In B, the matcher starts at
-    the body with the largest count. If all counts are 0, the matcher tries all bodies of B.
+    Without `choices`, the matcher searches for the pose of B's root and for the signs, zero offsets and
+    conversions of the joints. The search maximizes the number of joints and links that agree. Without `base`,
+    the matcher starts at A's root body. In B, the matcher starts at the body that shares the most link names
+    with A's root body. If no body of B shares a link name with A's root body, the matcher tries all bodies of
+    B. The matcher then also tries B's root body with the body of A that shares the most link names with B's
+    root body, if there is one.
     """
 
     def __init__(
@@ -313,11 +315,11 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair a link of A with a link of B that has another name and another pose.
+        """Pair a link of A and a link of B whose names do not occur in the other model.
 
-        The two links belong to matched bodies. For example, the links are different end-effector frames. The
-        result is None if a link of one body already matches a link of the other body. The result is also None
-        if every link name of one body occurs in the other model.
+        The two links belong to matched bodies, and count as different end-effector frames. The result is None
+        if a link of one body already matches a link of the other body. The result is also None if every link
+        name of one body occurs in the other model.
         """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
@@ -696,7 +698,7 @@ def _orders_to_try(
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
     """Align A and B again, with zero offsets that fit the mimic rules.
 
-    The result is `best` if the new alignment has more differences or a larger difference than `best`.
+    The result is `best` if the new alignment has more differences, or if its largest difference is larger.
     """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
@@ -774,7 +776,7 @@ def _best_alignment(
     ).find_best()
 
 
-#: To find a zero offset that fits the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
+#: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
 #: The factor is large, because a zero offset from two axes that are close to each other is inexact.
