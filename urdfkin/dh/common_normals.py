@@ -6,11 +6,11 @@ A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. These factors commute
-with the motion of the first joint. Therefore, the first joint's row contains phi and delta. In the same way,
-the second joint's row contains phi_next and delta_next. For skew axes, beta is 0. The other six numbers of
-the product are then unique, except that x can have the opposite direction (Denavit and Hartenberg).
-docs/dh.md explains the numbers for parallel and for nearly parallel axes.
+The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
+motion of the first joint, so phi and delta are parts of theta and d in the first joint's row. In the same
+way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes, beta is 0. The
+other six numbers of the product are then unique, except that x can have the opposite direction (Denavit and
+Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
 pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
@@ -256,14 +256,13 @@ class PairWithReference:
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return a transform for each pair of axes, and a cell theta for each pair.
+    """Return for each pair of axes the transform, and theta in the row of the pair's first joint.
 
-    The cell theta belongs to the row of the pair's first joint. The free choices are made so that the cells
-    are close to the cells of the reference table. `phi_in` is the angle (rad) about the first axis from frame
-    0 to the first joint's frame. `delta_in` is the offset (m) along the first axis between these frames.
-    `tip_offset` is the offset (m) along the last axis from the DH frame to the joint's frame. With this
-    offset, d of the last row equals d of the reference table's last row. If `tip_offset` is None, the two
-    values of d may differ.
+    The free choices are made so that the cells are close to the cells of the reference table. `phi_in` is the
+    angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m)
+    along the first axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH
+    frame to the joint's frame. With this offset, d of the last row equals d of the reference table's last
+    row. If `tip_offset` is None, the two values of d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -286,9 +285,9 @@ def _choose_offset(
 ) -> float:
     """Return the cell d of row i.
 
-    Usually, the result is d of the reference table's row i. In row 0 and in the row of a prismatic joint, d
-    can instead make a different cell equal to the reference table's cell. This different cell is d of a later
-    row, or a of a Hayati row.
+    Usually, the result is d of the reference table's row i. In row 0 or in a prismatic joint's row, d can
+    instead make another cell equal to the reference table's cell. The other cell is d of a later row, or a of
+    a Hayati row.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -318,10 +317,10 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return a free angle phi of row i for which theta of a row equals the reference table's theta.
+    """Return the free angle phi of row i.
 
-    Usually, this row is row i. If rows of prismatic joints follow, theta of these rows can be matched
-    instead.
+    Usually, theta of row i then equals the reference table's theta. If rows of prismatic joints follow, phi
+    can instead match theta in these rows.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:

@@ -82,8 +82,8 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
     """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
     `like` is a standard table of the same joints. The result copies from `like` the directions of the x axes,
-    and the offsets d along parallel axes. With `like`, `options.sign` has no effect. With `like`, the value
-    "first" is the only value of `options.parallel_offset` that has an effect.
+    and the offsets d along parallel axes. With `like`, `options.sign` has no effect, and
+    `options.parallel_offset` has an effect only if its value is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -225,7 +225,7 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # The projection of the base's x axis e is x = e - (e . z) z.
+    # The projection of the base's x axis e onto the plane normal to z is x = e - (e . z) z.
     # The expression below equals x, and has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
@@ -256,7 +256,7 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # With the option "first", each row contains its own offset here.
+    # For parallel_offset="first", each row contains the offset of its own link here.
     # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()

@@ -73,7 +73,7 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key for sorting tables: the closest table to the reference table has the smallest key."""
+    """Return a key for sorting tables; the table that is closest to the reference has the smallest key."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
@@ -141,8 +141,9 @@ def make_dh_table(
         slide: Rule for the position of a prismatic joint's axis, because a prismatic joint defines only the
             direction of its axis. "drawn": the axis passes through the joint's origin in the URDF. This axis
             is shifted if the shift avoids a tool, a translation of the base or a distant common normal.
-            "minimal": the axis passes through the origin of a neighbouring revolute joint, so that the cell a
-            between these two axes is 0. The previous joint is used only if the next joint is not revolute.
+            "minimal": the axis passes through the origin of the next joint if that joint is revolute.
+            Otherwise, the axis passes through the origin of the previous joint if that joint is revolute. The
+            cell a between these two axes is then 0. Without a revolute neighbour, the rule "drawn" applies.
         like: A published table. The result copies the positive joint directions and the directions of the x
             axes from this table. The result also copies the offsets d along parallel axes, and the zero
             positions of the first and the last joint. All other numbers come from the URDF. With `like`, the

@@ -206,7 +206,7 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace the cell with the joint's variable by the constant in the cell.
+    """Replace the cell that contains the joint's variable by the constant in this cell.
 
     For example, the cell "q3 + pi" becomes the number pi. The result also has the keys `kind` and `sense`.
     """

@@ -279,11 +279,10 @@ def screws_from_rows(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics has a
-    column for each joint. The shape (6, n) is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the
-    tip in the zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body"
-    (the tip). A screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a
-    pitch.
+    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics, with
+    a column for each joint, is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the tip in the
+    zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
+    screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S

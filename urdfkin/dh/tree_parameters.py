@@ -10,8 +10,8 @@ frame i:
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
 child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table equals
 the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified table, and the
-parameter r is called d(i). The angle beta is not part of the original notation. The angle beta is zero unless
-two axes are nearly parallel. Without beta, nearly parallel axes may need offsets of kilometres (Hayati).
+parameter r is called d(i). The angle beta is not part of the original notation, and is zero unless two axes
+are nearly parallel. Without beta, nearly parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -208,8 +208,8 @@ class _LinkAxis:
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
     links = list[_LinkAxis]()
-    # The list has an entry for each link: (index of the antecedent, T_antecedent_link, number of joints).
-    # The number counts the fixed joints between the antecedent and the link.
+    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
+    # A moving link has its own index i. For all other links, i is the index of the antecedent.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]

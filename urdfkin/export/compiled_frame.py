@@ -388,7 +388,7 @@ class CompiledFrame:
             )
         if out is not None and self._are_plain(inputs, row, out):
             # If a number is not finite, the code below checks the inputs again.
-            # The error message of the code below names the number's coordinate.
+            # The error message then names the coordinate of this number.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])

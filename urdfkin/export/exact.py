@@ -57,7 +57,7 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """Expressions with exact constants; `pi_multiples` maps a replaced angle to the multiple of pi."""
+    """Expressions with exact constants; `pi_multiples` maps each replaced angle to its multiple of pi."""
 
     zero = 0
 

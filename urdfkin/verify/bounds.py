@@ -7,8 +7,8 @@ this bound:
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
-orders. Large terms may cancel, so that both sums are small. The rounding errors of small sums can still be as
-large as eps times the scale.
+orders. Large terms may cancel, so that both sums are small. The bound on the rounding errors of these sums is
+still proportional to the scale.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
 (`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
@@ -324,7 +324,7 @@ def make_bound(
 def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
     """Return the `Magnitudes` for a comparison of urdfkin's results with MuJoCo's results.
 
-    The argument `magnitudes` contains the `Magnitudes` for a comparison with Pinocchio.
+    The argument `magnitudes` is valid for a comparison with Pinocchio.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
     `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to

@@ -112,8 +112,8 @@ class Call:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
-        `reshape` of a NumPy matrix may return an unexpected shape. For an unexpected shape, a kernel would
-        write past the end of the array.
+        `reshape` of a NumPy matrix may return an unexpected shape. A kernel would then write past the end of
+        the array.
         """
         if out is None:
             return None

@@ -28,7 +28,7 @@ _ledger_lock = make_fork_safe_lock()
 class VerificationError(UrdfkinError):
     """The results of urdfkin and the oracle differ by more than rounding can explain.
 
-    One of the two results is wrong.
+    At least one of the two results is wrong.
 
     Attributes:
         quantity: Name of the quantity.

@@ -65,7 +65,7 @@ def check_relative_placement(
     b relative to frame a; frame a is the last frame of `x.plan`.
 
     Let s_a be the length of the path from the world origin to frame a. Let k_a be the number of rounding
-    errors that the bound allows for the placement of frame a. The numbers s_b and k_b are the same numbers
+    errors that the bound allows for the placement of frame a. Let s_b and k_b be the corresponding numbers
     for frame b. The table contains errors in multiples of eps:
 
     | Number | Source | Error at most |

@@ -48,9 +48,9 @@ _MAX_QUOTE_LENGTH = 300
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    `remarks` contains elements of the file that the tree does not contain. If MuJoCo rejects the complete
-    file, the process compiles the file without shapes and inertias. `shapes_refusal` is the reason for the
-    rejection, or None if MuJoCo compiled the complete file. `pinocchio` is a report about Pinocchio's reader.
+    `remarks` contains elements of the file that the tree does not contain. If MuJoCo did not compile the
+    complete file, the result comes from the file without shapes and inertias. `shapes_refusal` is then the
+    reason, and otherwise None. `pinocchio` is a report about Pinocchio's reader.
     """
 
     urdf: str

@@ -561,10 +561,10 @@ class Oracle:
     A subclass builds the library's model in `__init__`. An oracle takes only names and sizes from `tree`, no
     geometry. Results have the shape (n, frames, ...).
 
-    `moving_base` connects the world and the root by a free-flyer. The user can add a root joint that the URDF
-    text does not contain. `root_joint` is the kind of this joint: "floating", "planar", or None for no root
-    joint. `lock` contains the values (rad or m) of locked joints. `new_data` returns a new data structure of
-    the library, for one thread.
+    `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
+    that the user has added: "floating" or "planar"; None without such a joint. The tree contains the root
+    joint, but the text does not. `lock` contains the values (rad or m) of locked joints. `new_data` returns a
+    new data structure of the library, for one thread.
 
     Raises OracleError if the library does not accept the text, or if the library's joints differ from the
     joints of `tree`.

@@ -40,7 +40,8 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: urdfkin needs the versions of Pinocchio for which tests confirm the definitions of accelerations and J-dot.
+#: urdfkin requires these versions of Pinocchio.
+#: Tests confirm the definitions of accelerations and J-dot only for these versions.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 

@@ -165,7 +165,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Maps each joint's name to five numbers that describe the joint's rounding errors in single precision.
+#: Maps each joint's name to five numbers that bound the effect of rounding to single precision.
 #: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
@@ -206,8 +206,8 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
     error of A B^-1 is at most e, and the position error of A B^-1 is at most w + e |p|.
 
     - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
-      the revolute joint. The mapping `single` adds the errors of B to the errors of the revolute joint, and
-      has no entry for the fixed joint.
+      the revolute joint. In `single`, the numbers of the revolute joint include the errors of B. The fixed
+      joint therefore has no entry in `single`.
     - Other joints: the last of the joint's five numbers in `single` is |p|.
     - Locked prismatic joint: the value q also displaces the child link. |q| is at most the length of the
       joint's constant offset plus the lengths of the two origins.

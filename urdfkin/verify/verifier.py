@@ -73,9 +73,8 @@ class Verifier:
 
     `known_refusal` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the
     library that checks the results of the robot's methods. Pinocchio always checks tables, the accuracy study
-    and enclosures, even if `oracle` is another library. If the source has another format than URDF,
-    `source_notes` is a text about the conversion to URDF and the check of this conversion. For a URDF,
-    `source_notes` is empty.
+    and enclosures, even if `oracle` is another library. `source_notes` is a text about the conversion of
+    another format to URDF and the check of this conversion. For a URDF, the text is empty.
     """
 
     def __init__(
@@ -222,7 +221,7 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that computes a quantity of one configuration, and checks and records the result.
+        """Return a function that computes, checks and records a quantity for one configuration.
 
         The returned function has the same arguments as `compute`. The last argument is `out`. If `compute`
         does not support the arguments, `compute` and the returned function return None. If the oracle cannot

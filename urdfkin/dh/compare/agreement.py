@@ -318,9 +318,8 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
     """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
-    The bound does not include rounding errors. The bound ignores mimic rules. The bound assumes that a
-    prismatic joint is within its limits. If `has_range` is false for these limits, the bound assumes a joint
-    value within `ASSUMED_LIMIT` of zero.
+    The bound does not include rounding errors, and mimic rules are ignored. Each prismatic joint is assumed
+    to be within its limits, or within `ASSUMED_LIMIT` of zero if `has_range` is false for the limits.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)

@@ -3,8 +3,8 @@
 The first fit changes the free parameters: base, tool and joint offsets. The second fit also changes cells,
 but as few cells as possible. The tip's error at each sampled configuration is a twist. The tip's motion due
 to a small change of a parameter or a cell is a twist too. The fit uses least squares to find changes whose
-twists cancel the error. Often, changes of different cells cancel the same error. Therefore, the fit repeats
-the least squares with new weights, so that as few cells as possible change.
+twists cancel the error. Often, changes of different cells cancel the same error. The second fit therefore
+uses reweighted least squares, which change as few cells as possible.
 
 Suppose that the axes of two joints nearly coincide. If an angle is added to one joint offset and subtracted
 from the other joint offset, the tip hardly moves. Therefore, a fit changes these two joint offsets slowly.
@@ -62,7 +62,7 @@ _PATIENCE = 4
 _ROUNDING = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _TIP_ROUNDING = 1e-12
-#: Other joint signs are accepted only if the tip error falls below this fraction of the best tip error.
+#: Other joint signs are accepted only if they reduce the smallest tip error so far below this fraction.
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) by which the offsets of two consecutive joints change in opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)

@@ -139,9 +139,9 @@ class TableComparison:
             assumed to be within 10 m of zero. The bounds do not include rounding errors.
         unfitted_metres, unfitted_radians: Largest tip error of the unfitted table on the samples.
         unfitted_differences: The cells that must change so that the unfitted table agrees with the URDF. The
-            tuple is empty if `mistakes` is not empty, or if `is_fitted` is false. The tuple is also empty if
-            a tip error remains after these changes. The tuple is also empty if these cells outnumber the
-            cells in `differences` by more than two.
+            tuple is empty if `mistakes` is not empty, or if `is_fitted` is false. It is also empty if a tip
+            error remains after these changes, or if these cells outnumber the cells in `differences` by more
+            than two.
         hidden: Row index and name of each hidden cell. A fit of base, tool and joint offsets can compensate
             for an error in a hidden cell.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.

@@ -88,9 +88,9 @@ def find_sign_fits(
 ) -> list[SignFit]:
     """Return up to `count` alignments of a path with a standard reference table.
 
-    The first alignment differs least from the reference table. The table must have the same kinds of joints
-    as the path. If the path has prismatic joints, several combinations of joint signs may give equal tables.
-    Only a fit can distinguish these combinations.
+    The alignments are in ascending order of their difference from the reference table. The table must have
+    the same kinds of joints as the path. If the path has prismatic joints, several combinations of joint
+    signs may give equal tables. Only a fit can distinguish these combinations.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}

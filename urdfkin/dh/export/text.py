@@ -305,7 +305,7 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
     """Return the largest absolute value (rad or m) of the joint that the row's joint mimics.
 
     If the table has no row of the mimicked joint, this value follows from the limits of the mimic joint.
-    Return 0 for a row without a mimic rule.
+    Return 0 for a row without a mimic rule, or with the multiplier 0.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0

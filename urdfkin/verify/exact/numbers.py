@@ -119,10 +119,9 @@ def format_decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Arithmetic functions for one kind of numbers, such as intervals.
+    """Arithmetic functions for one type of number, such as intervals.
 
-    `number` converts a double, or a decimal given as text, to a number of this kind, for example to an
-    interval.
+    `number` converts a double, or a decimal given as text, to this type of number.
     """
 
     number: Callable[[str | float], Number]

@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
 The inputs are the URDF's decimals and the exact values of q, v and a. The equations come from
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals measure rounding errors. The
-comparison with Pinocchio checks the equations.
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The intervals are used to measure rounding
+errors. The comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
