@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from tests.cli import running
-from tests.cli.running import Done
+from tests.cli.running import Done, refused
 from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import SpeedEstimator, format_progress
+from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.collector import CampaignProgress
 
 
@@ -65,6 +66,19 @@ def test_the_accuracy_study_reports_a_moving_base_only_if_requested(tmp_path: Pa
 
 
 @pytest.mark.slow
+def test_validate_reads_all_urdf_files_in_a_folder_and_its_subfolders(tmp_path: Path) -> None:
+    arm = catalogue()["planar_two_link"].path.read_text("utf-8")
+    for name in ("a.urdf", "inside/b.urdf", ".hidden/c.urdf", "notes.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(arm)
+    text = urdfkin("validate", tmp_path, "--samples", "1").text
+    assert "verified: 2 robots" in text
+    assert "a.urdf" in text
+    assert "inside/b.urdf" in text
+    (tmp_path / "empty").mkdir()
+    assert "no URDF found" in refused("validate", str(tmp_path / "empty"))
+
+
 def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -> None:
     data, made = tmp_path / "a.json", []
     for words in (("validate", "planar_two_link", "--samples", "3", "--json", data), ("report", data)):

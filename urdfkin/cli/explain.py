@@ -114,8 +114,15 @@ def explain_command(topic: str | None) -> None:
             remedy=f"give a number from 7.1 to 7.{LAST_EQUATION}",
         )
     else:
-        names = [name for rule in rules for name in (rule.id, rule.slug)]
-        raise UnknownNameError("code, equation or question", topic, [*names, *answers()])
+        names = [*(name for rule in rules for name in (rule.id, rule.slug)), *answers()]
+        words = set(topic.lower().split())
+        if related := [name for name in names if words & set(name.split("-"))]:
+            raise InputError(
+                "no code, equation or question has this name",
+                found=shorten(topic),
+                remedy=f"did you mean {', '.join(related[:3])}?",
+            )
+        raise UnknownNameError("code, equation or question", topic, names)
 
 
 def _list_matches(topic: str) -> list[str]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -45,6 +45,17 @@ _LANGUAGES_OF_SUFFIXES = {
     ".hpp": "cpp", ".hh": "cpp", ".hxx": "cpp", ".cpp": "cpp", ".cc": "cpp", ".cxx": "cpp",
     ".cuh": "cuda", ".cu": "cuda", ".py": "numpy", ".m": "matlab", ".tex": "latex",
 }  # fmt: skip
+#: Common names of languages and libraries, each with the name that --to accepts.
+_COMMON_NAMES = {
+    "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
+}  # fmt: skip
+
+
+class _Language(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if (name := _COMMON_NAMES.get(str(value).lower())) is not None:
+            self.fail(f"{value!r} is not the name of a language; did you mean {name}?", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 @click.command(epilog="Example: urdfkin export panda --frame panda_hand --to c -o panda_hand.c")
@@ -63,7 +74,7 @@ _LANGUAGES_OF_SUFFIXES = {
 @reference_option
 @click.option(
     "--to",
-    type=click.Choice(tuple(LANGUAGES)),
+    type=_Language(tuple(LANGUAGES)),
     help="Language of the code.",
     show_default="the language of the suffix of --output (.py: numpy); otherwise c",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from itertools import combinations
 from pathlib import Path
@@ -26,9 +27,10 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, report_compilation
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
+from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_value, json_text
-from urdfkin.system.files import write_file
+from urdfkin.system.files import exists, write_file
 
 if TYPE_CHECKING:
     from urdfkin.comparison.readers import LibraryReading
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
+#: A version of git, such as HEAD~1, main^ or HEAD:arm.urdf; it is no file for `urdfkin diff`
+_GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 
 @click.command("same", epilog="Example: urdfkin same ur5 ur5_limited --certificate same.json")
@@ -234,6 +238,10 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     )
 
     check_writable(markdown)
+    for source in (a, b, *more):
+        if _GIT_VERSION.fullmatch(source) and not exists(Path(source)):
+            remedy = "write `git show VERSION:FILE | urdfkin diff - FILE`"
+            raise InputError("this is a version in git, not a file", found=source, remedy=remedy)
     robots = load_robots(a, b, *more)
     with report_compilation():
         found = [diff(*pair, effects=effects) for pair in combinations(robots, 2)]

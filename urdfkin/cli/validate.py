@@ -27,8 +27,9 @@ from urdfkin.cli.reports import FILES, report_options, say_written, write_report
 from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
-from urdfkin.urdf.catalogue import example_robots
+from urdfkin.urdf.catalogue import catalogue, example_robots
 from urdfkin.verify.quantities import compared_titles, uncompared_titles
 
 if TYPE_CHECKING:
@@ -212,6 +213,9 @@ def validate_command(
     Disagreements are in multiples of eps * scale. Here eps is 2.2e-16, and scale is the size of the terms
     that are added to compute the number. Rounding alone gives 1 to 10.
 
+    ROBOT is a path, a name that `urdfkin robots` lists, or a folder. In a folder, the command validates all
+    .urdf files, also in subfolders, but not in hidden folders.
+
     With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
     any time.
 
@@ -242,7 +246,8 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or example_robots()]
+    sources = [source for robot in robots for source in _list_files(robot)] or list(example_robots())
+    given = [_load_stdin(robot, how) if with_study else robot for robot in sources]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
         handle_signals() as stop,
@@ -277,6 +282,15 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         raise InputError("--scheduler needs dask.distributed", remedy=install_command("cluster")) from None
     with connect_cluster(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
         yield cluster
+
+
+def _list_files(robot: str) -> list[str]:
+    """Return the .urdf files in a folder and its subfolders; otherwise, return only `robot`."""
+    from urdfkin.urdf.lint.settings import DEFAULT_INCLUDE, Settings, find_files
+
+    if robot in catalogue() or not is_folder(Path(robot)):
+        return [robot]
+    return find_files(robot, Settings(), DEFAULT_INCLUDE, ())
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:

@@ -86,6 +86,8 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             os.close(descriptor)
     except SourceError:
         raise
+    except FileNotFoundError as error:
+        raise SourceError("no such file", where=shorten_path(path)) from error
     # A null character in the name raises ValueError.
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -349,11 +349,16 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
+#: Lists of MuJoCo's model that kinematics does not use, each with the name of one element.
+_SINGULAR = {
+    "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
+    "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
+    "lights": "light", "meshes": "mesh", "hfields": "hfield", "materials": "material", "textures": "texture",
+}  # fmt: skip
+
+
 def _find_unused_elements(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    for words in (
-        "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
-        "lights", "meshes", "hfields", "materials", "textures",
-    ):  # fmt: skip
+    for words in _SINGULAR:
         if found := list(getattr(spec, words, ())):
             yield words, found
 
@@ -370,7 +375,10 @@ def _find_omissions(mujoco: Any, spec: Any) -> Iterator[MjcfRemark]:
         if useless.pop(words, None):
             yield MjcfRemark(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
-        counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
+        counts = ", ".join(
+            f"{len(found)} {words if len(found) > 1 else _SINGULAR[words]}"
+            for words, found in useless.items()
+        )
         yield MjcfRemark(f"kinematics does not use {counts}")
 
 
