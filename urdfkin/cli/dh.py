@@ -159,8 +159,7 @@ form_options = combine(
 #: With --like, a published table determines the values of these options.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: Options that affect the rows of the table.
-#: If ROBOT is a Denavit-Hartenberg table, each of these options makes the command derive a new table.
+#: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
 _DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

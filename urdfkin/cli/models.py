@@ -218,10 +218,11 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     """List the changes of each attribute from OLD to NEW, and how far the changes move the robot's frames.
 
     For each changed joint, the command prints the frame that the changes of this joint move farthest. The
-    printed distance is the largest distance in all configurations within the joint limits. OLD and NEW have
-    the same joint coordinates in each configuration. The last line of the output states how far all changes
-    together move the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the changes are the
-    differences that `urdfkin same` finds. If you name more than two robots, the command compares each pair.
+    printed distance is this frame's largest displacement in all configurations within the joint limits. OLD
+    and NEW have the same joint coordinates in each configuration. The last line of the output states how far
+    all changes together move the frames. If OLD and NEW have different formats (URDF, MJCF or USD), the
+    changes are the differences that `urdfkin same` finds. If you name more than two robots, the command
+    compares each pair.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

@@ -518,8 +518,8 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample per line.
 
-    A layout is a list of column names. Also return the layout that fits the number of columns. `units` is as
-    in `read_columns`.
+    Return the samples, and the layout that fits the number of columns. A layout is a list of column names.
+    `units` is as in `read_columns`.
     """
     import numpy as np
 

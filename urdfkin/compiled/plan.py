@@ -80,8 +80,8 @@ _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
 class CompiledTree:
     """The moving joints and the frames that a computation needs, stored in arrays.
 
-    The joints are in an order from the base outwards: every joint comes after the joints before it on the
-    path from the base.
+    The joints are sorted from the base outwards: a joint comes after all joints on the path from the base to
+    this joint.
 
     Attributes:
         joints: Indices of the moving joints in the tree's list of joints.

@@ -37,7 +37,7 @@ def least_squares(
     max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Start at `start` and search for the state with the smallest residuals.
+    """Search near `start` for the state with the smallest residuals.
 
     The function returns this state and the norm of its residuals. `derivatives` returns the negative
     derivatives (rows, parameters) of the residuals (rows,). A step is a vector (parameters,). The function

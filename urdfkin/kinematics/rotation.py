@@ -102,8 +102,8 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
     M is a rotation matrix whose entries may be rounded to nine decimals. The method is one Newton step
     (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is
-    3e-9 at most. Therefore, the error of the result is at most 1.4e-17. This error is an eighth of half an
-    eps (1.1e-16).
+    3e-9 at most. Therefore, the error of the result is at most 1.4e-17, an eighth of a rounding error
+    (eps/2 = 1.1e-16).
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)

@@ -83,7 +83,7 @@ The counts of an export's joint are
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
 offset's length. In matrix rows and cross products, an export omits each product that contains an omitted
-component. These products would have a rounding error of 1.5. The omission has a smaller error. Without fused
+component. The error of this omission is smaller than 1.5, the count of a product in the table. Without fused
 multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint. The errors of
 the sums over the joints are added to this difference. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these
 sums. The standard deviation of the error is the same for an export and for urdfkin. Test vectors contain true
@@ -91,7 +91,7 @@ values. Therefore, the difference between an export and test vectors is at most 
 within `PINOCCHIO_ROUNDINGS`.
 
 **Single precision.** An export in single precision has a separate bound for each number of a test vector. The
-unit is eps = 2^-23. Let x be the value of an operation or of a constant. Then x has a rounding error.
+unit is eps = 2^-23. The value x of each operation and of each constant has a rounding error.
 `urdfkin.export.function` multiplies this rounding error by the derivative of the result with respect to x.
 The bound is the sum of the absolute values of these products for all x. The error of one operation is
 
@@ -127,9 +127,9 @@ the file's axes by coordinate axes.
 oracle compute this angle from the same doubles m and c. Both programs round the multiplication and then the
 addition, so IEEE 754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin
 and the oracle combine the rules in the same order. Both programs start with the rule that refers to the
-independent joint. The table of a joint contains the errors of sine and cosine. The functions sine and cosine
-first subtract multiples of pi/2 from the angle. This subtraction is exact even for an angle of 1e12 rad.
-Therefore a mistake in a mimic joint's angle is always detected.
+independent joint. The first table above contains the errors of sine and cosine. The functions sine and
+cosine first subtract multiples of pi/2 from the angle. This subtraction is exact for every angle, even for
+1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
 
 **A base.** `urdfkin.BaseMotion` gives the robot's root link a pose in the world. A base with a rotation M
 counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
@@ -204,11 +204,14 @@ LEAST_UNIT = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
 
-#: urdfkin and Pinocchio may differ by joints * factors * PINOCCHIO_ROUNDINGS * eps * scale.
-#: `factors` is the number of factors of a term: for example, the term w x (w x d) has three factors.
+#: urdfkin and Pinocchio may differ by at most joints * factors * PINOCCHIO_ROUNDINGS * eps * scale.
+#: A tilt increases this limit. `joints` is the number of joints of the path plus one, or plus two for a
+#: rotated base. The docstring above derives these rules.
+#: `factors` is the number of factors of a term. For example, the term w x (w x d) has three factors.
 PINOCCHIO_ROUNDINGS = 24.0
-#: urdfkin and MuJoCo may differ by joints * factors * MUJOCO_ROUNDINGS * eps * scale.
-#: `factors` is the number of factors of a term: for example, the term w x (w x d) has three factors.
+#: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
+#: `joints` is the same number as for Pinocchio.
+#: `factors` is twice as large, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0

@@ -96,8 +96,8 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or a text must contain a value for every name. Exception: a text that begins with the name of a
-    pose contains only the values that differ from the pose.
+    A mapping or a text must contain a value for every coordinate. Exception: if a text begins with the name
+    of a pose, the text needs only the values that differ from the pose.
 
     Methods that compute a quantity share these arguments:
 
@@ -417,7 +417,7 @@ class Robot(Displayable):
     def joints(self) -> JointTable:
         """A dict of all joints by name, in Pinocchio's order; the dict contains fixed joints too.
 
-        Each value is a `Joint`, for example with an axis, limits and a mimic rule. `print` and notebooks show
+        Each value is a `Joint` with the joint's kind, axis, limits and mimic rule. `print` and notebooks show
         the dict as a table.
 
         >>> import urdfkin
@@ -904,9 +904,9 @@ class Robot(Displayable):
         In LOCAL_WORLD_ALIGNED, J a + J-dot v is the classical acceleration, which `acceleration` returns. In
         LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in LOCAL
         and WORLD, J a + J-dot v is the *spatial* acceleration. Let p'' be the linear part of `acceleration`.
-        Let p' and w be the linear and the angular part of `velocity`. In the same reference frame, the linear
-        part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not contain the acceleration that
-        a moving base causes.
+        Let p' and w be the linear and the angular part of `velocity`. If all these results have the same
+        reference frame, the linear part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not
+        contain the acceleration that a moving base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1395,7 +1395,7 @@ class Robot(Displayable):
         Args:
             frame: As in `export`.
             quantities: As in `export`. A call of the module returns the quantity with the fewest inputs. If
-                several quantities have only the input q, the call returns the first of these quantities.
+                several quantities have the fewest inputs, the call returns the first of these quantities.
             reference: As in `export`.
             verify: As in `export`.
 

@@ -487,7 +487,9 @@ _SUFFIXES = (
 
 
 def _parse_heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column name and the unit in a heading; the unit is "" for an SI unit.
+    """Return the column name and the unit in a heading.
+
+    The unit is "" for an SI unit, and for a heading without a unit. The unit is "deg" also for "deg/s".
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_parse_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]

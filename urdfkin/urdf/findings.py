@@ -146,8 +146,8 @@ class Severity(Enum):
 class PinocchioReading(Enum):
     """The effect of legal content of a URDF on Pinocchio.
 
-    - Refuses: Pinocchio refuses the file.
-    - Differs: Pinocchio deviates from the URDF specification.
+    - `REFUSES`: Pinocchio refuses the file.
+    - `DIFFERS`: Pinocchio deviates from the URDF specification.
     """
 
     REFUSES = "refuses"

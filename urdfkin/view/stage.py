@@ -59,8 +59,9 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return an arrow for each column of the Jacobian `x.jacobian`.
 
-    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. A column with a norm
-    of at most 1e-9 has no arrow.
+    `x` is a frame's motion with one sample and the reference frame LOCAL_WORLD_ALIGNED. An arrow shows the
+    linear part of a column, or the angular part if `angular` is True. A part with a norm of at most 1e-9 has
+    no arrow.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -131,8 +132,8 @@ _FOV = np.deg2rad(75.0)
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point at which the camera looks, both (3,) in m.
 
-    The picture then shows all `points` (n, 3), with a margin at the edges. `fov` is the vertical field of
-    view (rad). `aspect` is the width of the picture divided by the height.
+    The `points` (n, 3) then fill the picture, except for a margin at the edges. `fov` is the vertical field
+    of view (rad). `aspect` is the width of the picture divided by the height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _TO_CAMERA / np.linalg.norm(_TO_CAMERA)

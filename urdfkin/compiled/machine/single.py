@@ -107,10 +107,10 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles of an array, or 0 if the array is not as expected.
+    """Return the address of the doubles of an array, or 0 if the object `array` is not as expected.
 
-    The array must contain doubles and have NumPy's flags `flags`. The number of axes must be `axes`. The
-    first axis has the length `rows`, and each other axis has the length `columns`.
+    The object must be a NumPy array of doubles with the flags `flags` and `axes` axes. The first axis must
+    have the length `rows`, and each other axis must have the length `columns`.
     """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
