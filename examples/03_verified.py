@@ -1,4 +1,4 @@
-"""Compare urdfkin's results with Pinocchio's results, and print the certificate of the checked calls.
+"""Compare urdfkin's results with Pinocchio's results, and print the certificate.
 
 You learn how to choose the check of a single call with `verify`: all results, a sample, or none. You also
 learn that `certificate()` counts checked and unchecked results.

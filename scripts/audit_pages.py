@@ -55,7 +55,7 @@ _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Number of times that the script presses the Tab key on a page, and maximum number of PDF pages in pictures.
+#: Maximum number of presses of the Tab key on a page, and maximum number of PDF pages drawn as pictures.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
 #: The site's theme hides some elements if Chromium reports no mouse.

@@ -4,8 +4,8 @@
 
 The base is the commit at which the branch left `main` (or `origin/main`). Files that were only moved do not
 count as changed. If no user notices the change, add the line `No-changelog: <reason>` to a commit message of
-the branch. On main and in a shallow clone, the script finds no base. The script then prints "changelog not
-checked" with the reason, and exits with code 0.
+the branch. Without `--base`, the script finds no base in some cases, for example on main or in a shallow
+clone. The script then prints "changelog not checked" with the reason, and exits with code 0.
 """
 
 import argparse

@@ -63,7 +63,7 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) 
 
 
 def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Run the exported code in each language. Yield a name of the program, and its largest error ratio.
+    """Run the exported code in each language. Yield each program's name and largest error ratio.
 
     An error ratio is the error of a result, divided by the bound on this error.
     """

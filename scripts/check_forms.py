@@ -172,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return for each LaTeX table how much wider it is than the text of an `article`, in points."""
+    """Return how much wider (points) each LaTeX table is than the text of an `article`; 0 if it fits."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")

@@ -102,7 +102,7 @@ def draw_integral_of_w(figure: Any) -> None:
     for row, (title, order) in enumerate(cases):
 
         def w(t: float, order: tuple[int, int] = order) -> FloatArray:
-            """Return the angular velocity: 90 deg/s about `order[0]` until t = 1 s, then about `order[1]`."""
+            """Return the angular velocity: 90 deg/s about axis `order[0]` for 1 s, then about `order[1]`."""
             axis: FloatArray = np.eye(3)[order[0 if t < 1.0 else 1]]
             return np.pi / 2 * axis
 

@@ -35,8 +35,9 @@ _SINE_COSINE = 51
 class Number:
     """A number without a value, which records the operation that yields the number.
 
-    The field `operands` contains the two numbers that this operation combines. The field `constant` is 0 for
-    the constant zero, 1 for the constant one, and None for every other number.
+    The field `operands` contains the two numbers that this operation combines; it is empty for an input or a
+    constant. The field `constant` is 0 for the constant zero, 1 for the constant one, and None for every
+    other number.
     """
 
     constant: int | None = None

@@ -156,7 +156,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 # The benchmark measures a kernel for only the first step, a kernel for the first two steps, and so on.
 # The time of step k is the time of the kernel for k steps, minus the time of the kernel for k - 1 steps.
 # For one configuration, the benchmark measures seven lines of Python (`_calls`); most lines omit some steps.
-# For example, the forward recursion does not run if a line passes an invalid array `out`.
+# For example, the forward recursion does not run in the line that passes a tuple instead of an array `out`.
 # The time of a step is computed from differences between the times of the lines.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.

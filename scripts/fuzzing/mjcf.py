@@ -1,6 +1,8 @@
 """Make random MJCF files with free joints, equality constraints and default classes.
 
-The options `alignfree` and `fusestatic` let MuJoCo change the bodies of some files.
+In some files, MuJoCo aligns free bodies with their inertial frames (attributes `alignfree` and `align`), or
+fuses static bodies (attribute `fusestatic`).
+
 A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
 and checks the equality constraints, independently of urdfkin's MJCF reader.
 """

@@ -29,8 +29,8 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 class Change:
     """One mutant: a new value for an element of a list or for a field of a syntax node.
 
-    To change an element of a list, `container` is the list, and `key` is the index of the element. To change
-    a field of a syntax node, `container` is the node, and `key` is the name of the field.
+    If an element of a list changes, `container` is the list, and `key` is the index of the element. If a
+    field of a syntax node changes, `container` is the node, and `key` is the name of the field.
     """
 
     node: ast.AST  # The description of the mutant quotes the text of this node.
@@ -138,8 +138,8 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
     """Parse a piece of code, whose kind is unknown, into syntax nodes.
 
-    The code may be an expression. Otherwise, the code may be statements, keyword arguments, or either of
-    them; the result then contains both interpretations.
+    If the code is an expression, the result contains only the expression. Other code can be statements,
+    keyword arguments, or both; the result contains each possible interpretation.
     """
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):

@@ -15,8 +15,8 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
-#: The fit compares the noise in the residuals with an estimate of the noise (`noise_ratio`).
-#: If the ratio is below this number, the report states that the residuals are only rounding errors.
+#: If the user states no noise, the noise is estimated, and the estimate is at least the rounding error.
+#: If `noise_ratio` is then below this number, the report states that the residuals are only rounding errors.
 _ROUNDING = 0.5
 
 

@@ -184,7 +184,7 @@ def _cell(value: Units | str) -> str:
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Growth by a smaller factor is normal, because the samples are random.
 GROWTH_FACTOR = 2.0
-#: A disagreement in the new report is a regression only if it is larger than this number times eps * scale.
+#: A larger disagreement is a regression only if the new disagreement is above this number (in eps * scale).
 #: A single rounding error can cause a disagreement of this size.
 GROWTH_FLOOR = 2.0
 #: A larger ratio of disagreement to bound is a regression only if the new ratio is above this number.

@@ -40,8 +40,8 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 #: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
 #: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: The HTML page lists only this number of changes between runs, the latest changes first.
-#: On a terminal, the option --all removes the limit; otherwise the limit applies to changes and to runs.
+#: The HTML page lists at most this number of changes between runs, the latest changes first.
+#: On a terminal, the limit applies to changes and to runs; the option --all removes the limit.
 SHOWN = 20
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot. The key "" is for a run that did not include the robot.

@@ -40,7 +40,7 @@ from urdfkin.validation.document import (
 
 _READABLE = DisplayUnits(digits=6)
 
-#: The heat map shows ratios of disagreement to bound. Each colour ends at one of these ratios.
+#: The heat map shows ratios of disagreement to bound. The colour changes at each of these ratios.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 

@@ -47,7 +47,7 @@ _WIDE = 100
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report.
 
-    The report contains a command for each failed check, which computes the worst result again. If `cases` is
+    For each failed check, the report contains a command that computes the worst result again. If `cases` is
     True, the report contains such a command for every check.
     """
     robots = document["robots"]

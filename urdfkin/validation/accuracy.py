@@ -204,8 +204,8 @@ class _AccuracyBatch:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return the indices (n, links, m) of the nonzero columns in the Jacobian of each link.
 
-    The Jacobian with the most nonzero columns has m nonzero columns. For another Jacobian, the indices of its
-    nonzero columns come first, and indices of zero columns follow.
+    m is the largest number of nonzero columns in a Jacobian. If a Jacobian has fewer nonzero columns, their
+    indices come first, and indices of zero columns follow.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A file in the folder of a store is damaged; urdfkin computes the lost results again."""
+    """A file of a store is damaged or has an unknown name; `validate` computes lost results again."""
 
 
 def validate(

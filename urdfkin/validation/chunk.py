@@ -232,7 +232,7 @@ class _ComparisonBatch:
 
 
 class _Block(_ComparisonBatch):
-    """Comparison of a block of frames with the oracles.
+    """Comparison of urdfkin's results for a block of frames with the results of the oracles.
 
     Results for a joint are compared in the block of the joint's child link.
     """

@@ -48,8 +48,8 @@ _PER_THREAD, _MORE = 2, 4
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
-#: The scheduler needs none of these packages.
-#: But if a package is installed there, the scheduler and this process must have the same version.
+#: The scheduler does not need these packages.
+#: If the scheduler has one of the packages, the package must have the same version as in this process.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -267,7 +267,10 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Count an answer. If all sent chunks of the robot are answered, delete its text on the workers."""
+        """Reduce the number of the robot's unanswered chunks by one.
+
+        If the number is then 0, delete the robot's text on the workers.
+        """
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

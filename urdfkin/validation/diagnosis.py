@@ -273,7 +273,7 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Return the inputs q, v and a, in which the numbers of some joints are multiplied by `factor`.
+        """Return a copy of the inputs, in which the numbers of some joints are multiplied by `factor`.
 
         `at` has a pair for each joint: the index in q, and the index in v and a. For `count` 1, only q
         changes; for 2, q and v change; for 3, q, v and a change.
@@ -420,7 +420,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
     """Yield a sentence for each wrong column that has the opposite sign, is zero, or equals another column.
 
-    Each sentence is in a pair with its `Diagnosis.remainder`. The number is always 0.0.
+    Each sentence is in a pair with the number 0.0, which replaces `Diagnosis.remainder`.
     """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return

@@ -42,7 +42,7 @@ class ReportedMimic(TypedDict):
 class ReportedRange(TypedDict):
     """The values in a mimicked joint's range at which all its mimic joints are within their limits.
 
-    `lower` and `upper` are null if these values are no interval: there is only one such value, or none.
+    `lower` and `upper` are null if there is only one such value, or none.
     """
 
     lower: Annotated[float | None, doc("Lower end, rad or m; null: at most one joint value is allowed.")]
@@ -261,7 +261,7 @@ class ReportedOraclePair(TypedDict):
 
 
 class Alone(TypedDict):
-    """Numbers of results for which exactly one of three libraries differs, and the other two agree."""
+    """Number of results in which one library differs and the other two agree, for each of three libraries."""
 
     urdfkin: Annotated[Count, doc("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, doc("Number of results in which only Pinocchio differs.")]

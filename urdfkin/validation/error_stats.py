@@ -188,7 +188,7 @@ class ErrorStats:
         )
 
     def join_frames(self, other: ErrorStats) -> ErrorStats:
-        """Add the statistics of other frames. The samples of both statistics must be the same."""
+        """Return the statistics for all frames of `self` and `other`; both must have the same samples."""
         joined = replace(self, worst_by_frame=()) + replace(other, worst_by_frame=())
         return replace(joined, worst_by_frame=self.worst_by_frame + other.worst_by_frame)
 

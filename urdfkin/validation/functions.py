@@ -285,8 +285,8 @@ def verify_function(
         factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
             for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
             errors. `FunctionCheck.smallest_factor` is the smallest factor with which the check passes.
-        batch: If True, the function computes n configurations in one call. The function then receives
-            q (n, nq), v (n, nv) and a (n, nv), and returns n results.
+        batch: If True, the function computes n configurations in one call, and returns n results. The shapes
+            of the inputs are then (n, nq) for q, and (n, nv) for v and a.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
 
@@ -535,9 +535,9 @@ class _Run:
         A conversion that only reorders numbers has no rounding errors. A conversion that computes, for
         example degrees from radians, rounds each joint angle. The rounded angle differs from urdfkin's angle
         by up to 2 eps |q|, so the joint's rotation matrix has an error of up to 2 eps |q|. Each term of the
-        result is a product of `factors` vectors. Each of these vectors is rotated by at most all joints. The
-        error of a vector is therefore at most the sum of the errors of all rotation matrices. The matrix that
-        converts the velocities of a planar or floating joint adds at most 16 rounding errors.
+        result is a product of `factors` vectors. Each joint may rotate each of these vectors. The error of a
+        vector is therefore at most the sum of the errors of all rotation matrices. The matrix that converts
+        the velocities of a planar or floating joint adds at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None

@@ -5,8 +5,8 @@ samples * frames * 6 * nv numbers. The report is the same for every size of the 
 results do not depend on the other frames.
 
 All processes of a validation together use at most half of the memory that is free at the start. Each process
-gets an equal part of this memory. If a robot needs more memory than a process has, the robot is not verified.
-The report then states the needed and the allowed memory.
+gets an equal part of this memory. If a robot needs more memory than one process may use, the robot is not
+verified. The report then states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def estimate_bytes(tree: KinematicTree, samples: int) -> int:
-    """Estimate the peak memory (bytes) of a process while it compares the results for a robot."""
+    """Estimate the largest memory (bytes) that the comparison of a robot's results needs."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
     return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))

@@ -2,10 +2,11 @@
 
 The crash of a process affects only the robot that this process validates. A worker process is a new Python
 interpreter. A worker imports neither the parent's main module nor modules of the current folder, so a script
-needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot. If a
-robot crashes a process, the remaining chunks of the robot run after all other robots, in a separate process.
-The crashed chunk then runs again.
-With `isolate`, each robot has a separate process from the start, and the first crash is the robot's result.
+needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot.
+
+If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
+separate process. A second crash is the robot's result. With `isolate`, each robot has a separate process from
+the start, and the first crash is the robot's result.
 """
 
 from __future__ import annotations
