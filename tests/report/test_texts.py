@@ -3,7 +3,7 @@
 import copy
 import io
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from lxml import etree
@@ -70,6 +70,22 @@ def one(document: Document) -> Document:
 def test_only_commands_are_wider_than_the_terminal(make: Any, width: int) -> None:
     lines = printed(make(), width).splitlines()
     assert [line for line in lines if len(line) > width and "urdfkin" not in line] == []
+
+
+def test_robots_that_an_interrupted_validation_did_not_reach_share_one_line() -> None:
+    document = failing()
+    broken = document["robots"][2]
+    waiting = {"verdict": "not verified", "reason": "interrupted: 0 of 9 samples were compared"}
+    document["robots"] += [cast("Any", broken | waiting | {"source": f"arm{i}"}) for i in range(5)]
+    lines = printed(document, 140).splitlines()
+    assert (
+        "arm0, arm1, arm2 and 2 more robots: not verified: interrupted: 0 of 9 samples were compared" in lines
+    )
+    assert not any(line.startswith("arm4:") for line in lines)
+    assert "broken.urdf: bad input: broken.urdf: the URDF has an error" in lines
+    document["robots"].pop()
+    lines = printed(document, 140).splitlines()
+    assert "arm3: not verified: interrupted: 0 of 9 samples were compared" in lines
 
 
 def test_text_without_a_terminal_has_no_escape_sequence_and_no_markup() -> None:

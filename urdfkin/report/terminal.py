@@ -70,13 +70,29 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
             style="bold",
         )
         print_table(out, _cross_check_table(robots, title))
+    shared_reasons = _shared_reasons(robots)
+    for (verdict, reason), names in shared_reasons.items():
+        out.print(f"{', '.join(names[:3])} and {len(names) - 3} more robots: {verdict}: {reason}")
     for robot in robots:
-        _print_robot(robot, out, cases=cases)
+        has_own_reason = (robot["verdict"], robot["reason"]) not in shared_reasons
+        _print_robot(robot, out, cases=cases, reason=has_own_reason)
     found = outcome_of(document)
     passed = "verified: " if found.passed else ""
     out.print(passed + summary(document), style="bold green" if found.passed else "bold red")
     if found.reason:
         out.print(f"not passed: {found.reason}", style="bold red")
+
+
+def _shared_reasons(robots: Sequence[ReportedRobot]) -> dict[tuple[str, str | None], list[str]]:
+    """Return the names of the robots without any check, by verdict and reason, if more than four are equal.
+
+    For example, all robots that an interrupted validation did not reach have the same reason.
+    """
+    names: dict[tuple[str, str | None], list[str]] = {}
+    for robot in robots:
+        if robot["reason"] and not robot["checks"]:
+            names.setdefault((robot["verdict"], robot["reason"]), []).append(robot["source"])
+    return {key: sources for key, sources in names.items() if len(sources) > 4}
 
 
 def _counts(robot: ReportedRobot) -> list[str]:
@@ -166,8 +182,8 @@ def _accuracy_table(study: ReportedAccuracy) -> Table:
     return Table(heads, rows)
 
 
-def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
-    if robot["reason"]:
+def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool, reason: bool) -> None:
+    if robot["reason"] and reason:
         first, *rest = robot["reason"].split("\n")
         out.print(f"{robot['source']}: {robot['verdict']}: {first}")
         for line in rest:
