@@ -61,9 +61,10 @@ def comment_name(name: str) -> str:
 
 
 def comment_text(text: str) -> str:
-    r"""Return a text as printable ASCII that does not end a comment in any language.
+    r"""Return a text that can be written into a comment of exported code in any language.
 
-    Question marks are replaced too, because C's trigraphs, such as ??/, contain question marks.
+    An underscore replaces each character that is not printable ASCII, and each character that could close the
+    comment. Question marks are replaced too, because C's trigraphs, such as ??/, contain question marks.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

@@ -229,7 +229,7 @@ def _find_tolerances(
 
 
 def format_decimal(x: Number) -> str:
-    """Return fifty digits of an interval, without final zeros; 0.0 if the interval contains 0."""
+    """Return an interval as a decimal number of up to fifty digits; "0.0" if the interval contains 0."""
     ball = as_interval(x)
     if ball.contains(0):
         return "0.0"

@@ -140,7 +140,8 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
     """Return a function for `Dialect.result`.
 
-    The exported code stacks numbers, because arrays may be immutable.
+    The exported code combines all numbers into a new array with the library's function `stack`. The code does
+    not assign numbers to array elements, because arrays may be immutable (JAX).
     """
 
     def result(writer: Writer) -> Iterator[str]:

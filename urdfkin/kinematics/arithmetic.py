@@ -1,6 +1,7 @@
-"""Copy the textbook's equations with other definitions of sum, product, sine and other operations.
+"""Copy the textbook's equations for other types of numbers, such as NumPy arrays.
 
-For example, one copy computes with NumPy arrays, and another copy writes LaTeX.
+The caller gives functions for the operations, such as sum, product and sine. The copied equations call these
+functions. For example, one copy computes with NumPy arrays, and another copy writes LaTeX.
 
 This module does not import NumPy.
 """

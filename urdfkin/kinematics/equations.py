@@ -78,7 +78,7 @@ def about_z(sine, cosine, zero, one):
 
 
 def rotation_of_quaternion(x, y, z, w):
-    """Return the rotation of a unit quaternion, scalar last (7.44 in terms of the half angle)."""
+    """Return the rotation matrix of a unit quaternion; w is the scalar part."""
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),

@@ -25,7 +25,8 @@ def translate_point(state: LinkBounds, d: Length) -> LinkBounds:
 def after_revolute(state: LinkBounds, d: Length, o: Length, o_rate: Length) -> LinkBounds:
     """Return the bounds of the link after a revolute joint (7.127, 7.129).
 
-    The offset of the joint has the length d, and o is the absolute value of the joint velocity.
+    Let d be the length of the joint's offset. Let o be the absolute value of the joint velocity, and let
+    o_rate be the absolute value of the joint acceleration.
     """
     p, w, vel, alpha, acc = translate_point(state, d)
     w = eq.angular_velocity(w, _Z, o)

@@ -1,4 +1,4 @@
-"""The textbook's equations for NumPy arrays, and for upper bounds on the lengths of vectors.
+"""Two versions of the textbook's equations: one computes results, the other bounds the results.
 
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.
@@ -74,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: Copies of the functions in `equations`; a copy returns the scale of the equation's result.
-#: The arguments of a copy are lengths of vectors and absolute values of numbers.
+#: For each function in `equations`, a function that returns the scale of the equation's result.
+#: For a vector, such a function takes the vector's length; for a number, it takes the absolute value.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,

@@ -552,8 +552,8 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
     """Return the distance (rad) between the middle Euler angle and the singularity, called gimbal lock.
 
     The distance is in [0, pi/2]. A proper Euler sequence such as ZYZ is singular if the middle angle is a
-    multiple of pi. The textbook names only the angle 0. The other sequences are singular if the middle angle
-    is an odd multiple of pi/2.
+    multiple of pi. Of these singular angles, the textbook mentions only the angle 0. The other sequences are
+    singular if the middle angle is an odd multiple of pi/2.
     """
     middle = as_vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))

@@ -234,7 +234,7 @@ SINGLE_POLYNOMIAL = 1.0
 #: Two programs can compute different constant poses from the same file.
 #: This number is the allowed difference (in eps per joint).
 #: If all rounding errors have the same sign, the difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
-#: The first table of the docstring above contains these four errors of constant rotations and their products.
+#: The first and the third row of the first table in the docstring above contain these four errors.
 #: The standard deviation of the difference is 2.4 eps, so 13.7 is nearly six standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Sum of the rounding errors (in eps) in the directions of two joint axes.
@@ -277,7 +277,7 @@ DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: The two matrix multiplications have the errors 1.4 and 1.8.
 ROTATION_ROUNDINGS = 8.0
 
-#: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
+#: Allowed error (in eps) of a mimicked joint's limit that urdfkin computes from a mimic joint's limit.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
 #: The sum of the four errors is 2.0.

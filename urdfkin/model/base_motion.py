@@ -102,9 +102,10 @@ FIXED_BASE_STATE = freeze(FIXED_BASE.state(()))
 
 
 def subtract_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
-    """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
+    """Subtract the gravity vector from the linear acceleration in each state of the base.
 
-    The readings of an accelerometer do not change if gravity is replaced by an acceleration of the base.
+    `state` has the shape (1, 24) or (n, 24). `gravity` has the shape (3,) and the unit m/s^2. The readings of
+    an accelerometer do not change if gravity is replaced by an acceleration of the base.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

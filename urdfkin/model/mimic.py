@@ -51,7 +51,10 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g (joints,): the joint values if every coordinate is zero."""
+        """The vector g (joints,) in the formula of all joint values, G q + g.
+
+        For a mimic joint, the entry of g is the offset in the mimic rule. For other joints, the entry is 0.
+        """
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, symbol: str = "q") -> CoordinateLayout:

@@ -109,7 +109,7 @@ MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A joint value is far outside the limits if both of the following conditions hold.
 #: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
 #: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
-#: If a joint has only one limit, each value that exceeds this limit is far outside.
+#: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 

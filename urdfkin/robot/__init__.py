@@ -1498,19 +1498,20 @@ class Robot(Displayable):
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
-                joint's origin in the URDF. "minimal": the axis passes through the origin of the next joint if
-                that joint is revolute, otherwise through the origin of a revolute previous joint. The length
-                a between these two axes is then 0.
-            like: A published table. The returned table has the published table's positive joint directions,
-                directions of x, and offsets along parallel axes. The first and the last joint have the
-                published table's zero positions. All other numbers come from the URDF. With `like`,
-                `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
+                joint's origin in the URDF. "minimal": the axis passes through the origin of a neighbouring
+                revolute joint, so the length a between the two axes is 0. The previous joint is used only if
+                the next joint is not revolute.
+            like: A published table. The result copies the positive joint directions and the directions of the
+                x axes from this table. The result also copies the offsets d along parallel axes, and the
+                zero positions of the first and the last joint. All other numbers come from the URDF. With
+                `like`, `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
             UnknownNameError: a frame or a joint does not exist.
-            InputError: an option has an invalid value, an option excludes `like`, or the path contains a
-                planar or floating joint.
+            InputError: an option has an invalid value, or the path contains a planar or floating joint. The
+                combination of `like` with another value than the default of `flip`, `first`, `last`, `sign`
+                or `parallel_offset` also raises InputError.
             TableError: Pinocchio's placements differ by more than the bound.
 
         Example:

@@ -58,12 +58,12 @@ class ConventionRobot:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of q in the target program."""
+        """Names of the elements of the vector q in the target program."""
         return self.conversion.coordinate_names
 
     @property
     def velocity_names(self) -> tuple[str, ...]:
-        """Names of the numbers of v and a in the target program."""
+        """Names of the elements of the vectors v and a in the target program."""
         return self.conversion.velocity_names
 
     def neutral(self) -> FloatArray:

@@ -151,7 +151,8 @@ class DocumentKind(Generic[_T]):
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
     """Return the JSON path and a description of the first unknown entry in `data`, or None.
 
-    An entry is unknown if `document`, the result of the conversion of `data`, does not contain the entry.
+    `document` is the result of the conversion of `data`. An entry of `data` is unknown if the entry is
+    missing in `document`.
     """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:

@@ -11,9 +11,9 @@ folder that exists:
    searches for `src/name`, then for each `src/*/name`. If `src` is called `name`, urdfkin first tries `src`.
 2. The environment variable `AMENT_PREFIX_PATH` lists folders. In each folder `prefix` of this list, urdfkin
    searches for `prefix/share/name`.
-3. In each parent folder `above` of `referring_file`, from the nearest folder to `/`, urdfkin searches for
-   `above/name`. If `above` is called `name` or contains the `package.xml` of the package `name`, urdfkin
-   first tries `above`.
+3. In each parent folder of `referring_file`, from the nearest folder to `/`, urdfkin searches for the
+   subfolder `name`. A parent folder is the package itself if the folder is called `name`, or if it contains
+   the `package.xml` of the package `name`. In this case, urdfkin first tries the parent folder.
 """
 
 from __future__ import annotations

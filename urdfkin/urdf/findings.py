@@ -144,7 +144,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """The effect of legal content of a URDF on Pinocchio.
+    """Pinocchio's problem with a file that conforms to the URDF specification.
 
     - `REFUSES`: Pinocchio refuses the file.
     - `DIFFERS`: Pinocchio deviates from the URDF specification.
@@ -422,10 +422,10 @@ MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
 #: If a code has at least `MIN_FOLDED` warnings or notes, one finding represents all of them.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: Kinematics does not use the content to which the codes URDF7xx refer.
+#: The codes URDF7xx refer to inertials, shapes, meshes and materials, which kinematics does not use.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: Maximum number of errors with one code that are reported separately.
+#: If many errors have the same code, urdfkin reports at most this number of these errors separately.
 MAX_ERRORS_PER_CODE = 100
 
 #: Maximum number of findings with one code and severity that are stored completely.
@@ -510,7 +510,10 @@ class Reporter:
             self.silenced_findings.append((finding, reason))
 
     def silence(self, comment_index: CommentIndex) -> None:
-        """Apply comments to all findings, including findings that are added later."""
+        """Silence all warnings and notes that the file's comments name, including later warnings and notes.
+
+        An example of such a comment is `<!-- urdfkin: ignore[URDF503] the reason -->`.
+        """
         self.comment_index = comment_index
         for (code, severity), group in self._groups.items():
             if severity is not Severity.ERROR:

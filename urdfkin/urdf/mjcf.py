@@ -176,8 +176,9 @@ class Mjcf:
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return one number for each frame, shape (n, frames).
 
-        The shape of `at_body` is (n, bodies), and the shape of `own` is (sites,). For the frame of a site,
-        the function adds the number of the site in `own` to the number of the site's body in `at_body`.
+        `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The numbers of a body's frame
+        are the body's column of `at_body`. The numbers of a site's frame are the column of the site's body
+        plus the constant `own[site]`.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -406,7 +407,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
         site.material = ""
     for joint in spec.joints:
         # The next loop replaces all inertias by placeholders.
-        # MuJoCo must not align the frame of a body with a placeholder.
+        # With `align`, MuJoCo would align the frame of a body with the body's inertial frame.
+        # The inertia is only a placeholder, so `align` is switched off.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)

@@ -211,7 +211,7 @@ class Cluster:
         #: Sent chunks without an answer.
         #: Each value contains the task of the chunk and the number of times that the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: Texts of robots that the workers store.
+        #: For each robot, a future of the text that describes the robot. The workers store this text.
         self._robots: dict[int, Future[bytes]] = {}
         #: Number of chunks without an answer for each robot.
         self._in_use = Counter[int]()

@@ -1,8 +1,9 @@
 """Error statistics of a validation.
 
-The statistics of several chunks, processes and machines can be added. The addition is commutative
-and associative. Therefore, the sum does not depend on the division of the samples into chunks. If two worst
-cases are equally bad, the sum keeps the case with the smaller sample number.
+The statistics of several chunks, processes and machines can be added. The addition is commutative and
+associative. Therefore, the sum does not depend on the division of the samples into chunks. The sum of two
+statistics contains the worse of the two worst cases. If both cases have the same error, the sum contains the
+case with the smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
@@ -50,8 +51,8 @@ class CrossCheck:
     Attributes:
         alone: Numbers of results for which one library differs and the other two agree. The numbers belong to
             the libraries in the order of `CROSS_CHECKED`.
-        undecided: Number of results without a majority. Either no two libraries agree, or one library
-            agrees with both others, but these two disagree.
+        undecided: Number of results without a majority. For such a result, either all three pairs of
+            libraries disagree, or exactly one pair disagrees.
     """
 
     by: str

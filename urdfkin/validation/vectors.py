@@ -70,7 +70,8 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _GRID = 1024.0
-#: A tolerance is rounded to 12 digits, and then rounded up to 3 digits.
+#: A tolerance is first rounded to 12 significant digits.
+#: Then the tolerance is rounded upward to 3 significant digits.
 #: The rounding to 12 digits removes the last digits, which differ between processors.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
@@ -88,7 +89,7 @@ QUANTITIES = (
 
 
 class JointEntry(TypedDict):
-    """A joint with coordinates, and the indices of the joint's numbers in q, v and a."""
+    """A joint that has its own elements in q, v and a, and the indices of these elements."""
 
     name: Annotated[str, doc("Name of the joint.")]
     type: Annotated[str, doc("Type of the joint in the URDF.")]

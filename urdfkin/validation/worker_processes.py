@@ -135,7 +135,11 @@ class ProcessEngine:
         self._jobs, self._isolate = jobs, isolate
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        """Run the tasks. If a robot crashed its process, the robot's remaining tasks run last and alone."""
+        """Run the tasks of all robots.
+
+        If a process crashes during the tasks of a robot, the remaining tasks of this robot run last. Each
+        such robot then has a process of its own.
+        """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
             return

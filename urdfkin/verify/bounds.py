@@ -222,7 +222,7 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array (n or 1, ...).
+    """Return the columns of an array. The array has n rows, or one row for all n configurations.
 
     For a single configuration (n = 1), the columns are Python numbers.
     """

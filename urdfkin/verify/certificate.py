@@ -263,7 +263,7 @@ class Account:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         disabled_checks: Number of results of calls with verify=False.
         counters: A pair (array, index) for each compiled function that computes results without checks. The
-            compiled function counts the results in array[index].
+            compiled function increases array[index] by the number of computed results.
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)

@@ -72,11 +72,12 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """A moving joint's first indices in the vectors of MuJoCo and of urdfkin, and the joint's mimic rule.
+    """The indices of one moving joint in MuJoCo's and in urdfkin's vectors, and the joint's mimic rule.
 
-    `qpos` and `qvel` are indices in MuJoCo's vectors. `q` and `v` are indices in urdfkin's vectors. An index
-    is -1 if urdfkin's vector has no value for the joint. For a moving base, `q` and `v` are -1. For a locked
-    joint, `v` is -1, `multiplier` is 0, and `offset` is the locked value.
+    Each index is the index of the joint's first element. `qpos` and `qvel` are indices in MuJoCo's vectors.
+    `q` and `v` are indices in urdfkin's vectors. An index is -1 if urdfkin's vector has no value for the
+    joint. For a moving base, `q` and `v` are -1. For a locked joint, `v` is -1, `multiplier` is 0, and
+    `offset` is the locked value.
     """
 
     kind: str

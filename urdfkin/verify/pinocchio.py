@@ -122,7 +122,8 @@ _BLOCK_SIZE = 16384
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 
-#: Prefix of link names while Pinocchio reduces a model; XML does not allow this character in names.
+#: Prefix of link names while Pinocchio reduces a model.
+#: XML forbids the character U+0001 in names, so no joint of a URDF has a name with this prefix.
 _LINK_PREFIX = "\x01"
 
 

@@ -55,7 +55,8 @@ class Quantity:
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
             frames, ...). If `recursive` is False, `compute` may have other arguments.
         ask_oracle: Function (oracle, query) that returns the oracle's results (n, frames, ...).
-        blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
+        blocks: Function (oracle, query) that yields the oracle's results in blocks. Each block contains the
+            results for some of the configurations.
         scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
         factors: Each number of a result is a sum of terms, and each term is a product of rotated vectors, the
             factors. `factors` is the largest number of factors in a term for LOCAL_WORLD_ALIGNED.

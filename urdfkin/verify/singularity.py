@@ -150,7 +150,7 @@ class _Explanation:
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, the directions that only this configuration loses are unknown.
+        # If these directions depend on q, urdfkin cannot determine the lost directions of this configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:

@@ -109,8 +109,9 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.bound_ratio > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
-    # The axis is linear below 1 eps * scale, the size of one rounding error.
+    # The plot's vertical axis is logarithmic.
+    # The reason is that bounds are about a hundred times the usual disagreement.
+    # Below 1 eps * scale, the size of one rounding error, the plot's vertical axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -216,7 +217,7 @@ _PAGE = (7.6, 10.4)
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
 #: Number of letters that fit into one inch of the footer, and into one inch of a legend.
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
-#: Width of a legend entry without its text, as a number of letters.
+#: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
 _HANDLE = 8
 _VELOCITIES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"

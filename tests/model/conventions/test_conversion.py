@@ -209,7 +209,7 @@ TWICE = "two joints have the same name in the convention: found"
         ('quaternion = "wxzy"', "`quaternion` must be one of: xyzw, wxyz: found 'wxzy'"),
         ("joints = 3", "`joints` must be a list of names"),
         ("joint = 3", "`joint` must contain tables"),
-        ("=", "the convention is not a TOML file"),
+        ("=", "the convention file is not valid TOML"),
     ],
 )
 def test_an_invalid_convention_file_is_an_error_with_the_place(

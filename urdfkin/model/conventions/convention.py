@@ -160,7 +160,7 @@ def parse_convention(text: str, where: str, name: str) -> Convention:
     try:
         entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError("the convention is not a TOML file", where=where, found=str(error)) from None
+        raise InputError("the convention file is not valid TOML", where=where, found=str(error)) from None
     like = entries.pop("like", "urdf")
     if like not in _load_built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
@@ -266,8 +266,10 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: The last base-62 digit of an encoded number has a value from 0 to 30.
-#: Each digit before the last digit has a value from 31 to 61.
+#: An encoded number is a sequence of characters of `_DIGITS`.
+#: The value of a character is its index in `_DIGITS`, from 0 to 61.
+#: The last character of a number has a value below `_THRESHOLD`.
+#: All other characters of the number have values of at least `_THRESHOLD`.
 _THRESHOLD = 31
 
 

@@ -391,9 +391,9 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
-        The conversion of v may depend on q. The conversion of a may depend on q and v. If q is equal in both
-        conventions, the result can be the array q itself. A wrong length or a number that is not finite
-        raises InputError.
+        The conversion of `v` may depend on `q`. The conversion of the joint accelerations `a` may depend on
+        `q` and `v`. If q is equal in both conventions, the result can be the array q itself. A wrong length
+        or a number that is not finite raises InputError.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)

@@ -323,8 +323,8 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If no joint follows an axis, the axes of other branches determine the pose of B's root.
-        # For example, no joint follows the axes of a drone's rotors.
+        # If a branch has no joint after this axis, the axes of other branches determine the pose of B's root.
+        # For example, each rotor of a drone has a branch of its own with a single joint.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -396,11 +396,11 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first pair of revolute axes for each pair of a branch of A and a branch of B.
+    """Combine each branch of A with each branch of B, and return the first revolute axes of both branches.
 
-    Each item contains the first revolute pair, the prismatic pairs before this pair, and the pairs after this
-    pair. If two branches have only prismatic pairs, the item contains the last prismatic pair instead of a
-    revolute pair.
+    There is one item for each combination. The item contains the first revolute pair, the prismatic pairs
+    before this pair, and the pairs after this pair. If two branches have only prismatic pairs, the item
+    contains the last prismatic pair instead of a revolute pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -435,9 +435,10 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
     return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
 
 
-#: Function that proposes poses of B's body after two matched joints.
-#: The first argument contains the two bodies after the joints, and the second argument contains the joints.
-#: The third argument is the pose of B's body before the joints.
+#: Function that proposes poses of the next body of B.
+#: In A and in B, one of two matched joints connects the current body to the next body.
+#: The first argument contains the next bodies of A and B, and the second argument contains the two joints.
+#: The third argument is the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.

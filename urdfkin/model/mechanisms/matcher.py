@@ -280,7 +280,11 @@ class MechanismMatcher:
         return self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: EdgePair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield possible poses of B's body after a joint, for the pose X of B's body before the joint."""
+        """Yield possible poses of the next body of B.
+
+        The joints `via` connect the current bodies of A and B to the next bodies `beyond`. X is the pose of
+        B's current body.
+        """
         next_pair = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = motion_type(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -779,7 +783,8 @@ def _best_alignment(
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
-#: The factor is large, because a zero offset from two axes that are close to each other is inexact.
+#: The factor is large, because urdfkin computes a zero offset from the axes of two joints.
+#: If these axes are close to each other, the computed zero offset is inexact.
 OFFSET_FACTOR = 1e4
 
 
@@ -813,7 +818,7 @@ class _Rule:
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def offset_for(self, beta: float) -> float:
-        """Return the joint's zero offset o that gives y = alpha x + beta."""
+        """Return the joint's zero offset o for a given constant beta in y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

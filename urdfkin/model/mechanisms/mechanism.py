@@ -442,9 +442,9 @@ class MatchedJoints:
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         kind_difference: "a" if only A's joint is fixed, and "b" if only B's joint is fixed. "kind" if both
-            joints move and have different kinds of motion. A planar or floating joint can be reversed in one
-            model; without a conversion in the given `AlignmentChoices`, the value is then "kind". An empty
-            string in all other cases.
+            joints move and have different kinds of motion. One of the two models may exchange the parent and
+            the child of a planar or floating joint. For such a joint, the value is "kind" if the given
+            `AlignmentChoices` contain no conversion for the joint. An empty string in all other cases.
         conversion: Converts coordinates of a planar or floating joint of A to coordinates of B's joint. None
             if the coordinates are equal.
     """
@@ -577,8 +577,8 @@ class Alignment:
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `name_map`. For each of the two joint pairs, A and B
-        differ at the joint pair, or at a later joint or link.
+        The names of a and c occur neither in B nor in `name_map`. For each of the two joint pairs, the two
+        joints differ, or later joints or links of A and B differ.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -590,7 +590,10 @@ class Alignment:
                 yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Make a `FramePair` for each pair of a link of A and a link of B on matched bodies."""
+        """Return a `FramePair` for each pair (a, b) of `pairs`: the link a of A and the link b of B.
+
+        A pair is omitted if the bodies of its two links are not matched.
+        """
         matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
         frames = []
@@ -669,7 +672,7 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: The value of B's joint with the direction and zero of B's URDF.
+    #: The value of B's joint, measured with the positive direction and the zero position in B's URDF.
     #: The formula is b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.

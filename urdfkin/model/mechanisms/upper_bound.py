@@ -23,8 +23,9 @@ If joint i is the same in A and B, the first three terms are 0. For each directi
 at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
 and d. If A and B differ at several joints, the terms of these joints may be largest in different
 configurations. The sum of the maxima then exceeds the true maximum. If A and B differ only in constant
-motions L, urdfkin computes a second bound, and uses the smaller of the two bounds. The second bound is the
-sum of the distances by which each L can move the frame.
+motions L, urdfkin computes a second bound, and uses the smaller of the two bounds. For each motion L, urdfkin
+computes an upper bound on the displacement of the frame by L. The second bound is the sum of these upper
+bounds.
 
 **Second derivatives.** Let D = p_B - p_A, where p_A and p_B are the frame's positions in A and B. The
 function `curvature` returns upper bounds on the second derivatives of D. The function computes these bounds

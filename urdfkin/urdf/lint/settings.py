@@ -279,7 +279,7 @@ def find_known_findings(
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # Every finding is new if the xacro file or a file with an includable suffix has changed.
+        # If the xacro file or a file that it may include has changed, all findings count as new.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)

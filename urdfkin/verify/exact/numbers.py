@@ -62,7 +62,7 @@ def enough_digits(joints: int) -> int:
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Set the number of decimal digits of intervals in a `with` block.
+    """Compute all intervals inside a `with` block with the given number of decimal digits.
 
     Arb has one precision for the whole process. While one thread runs such a block, a lock therefore makes
     other threads wait.
@@ -79,7 +79,7 @@ def as_interval(value: Number) -> Number:
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
     # An integer is exact and needs no rounding.
-    # Skipping the rounding saves time, because most numbers of a large robot are the integer 0.
+    # The results of a large robot are mostly the integer 0, so this shortcut saves time.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Kinematics uses a macro only if the macro is directly inside <robot> or inside a joint.
+    # A macro can change the kinematics only if the macro is directly inside <robot> or inside a joint.
     if _report_xacro(
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
     ):
@@ -492,9 +492,10 @@ def _read_comment(report: Reporter, comment: Comment, codes: Mapping[str, str]) 
 
 
 def check_unused_comments(report: Reporter) -> None:
-    """Report a code in a comment if the comment silenced no finding with this code.
+    """Report unused codes in comments such as `<!-- urdfkin: ignore[URDF503] the reason -->`.
 
-    Call this function after all other rules.
+    A code is unused if the comment silences no finding with this code. Call this function after all
+    other rules.
     """
     for ignore in report.comment_index.comments:
         for code in ignore.codes:

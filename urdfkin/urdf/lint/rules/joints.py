@@ -513,7 +513,8 @@ SUSPICIOUS_ROBOT_SIZE = 1e-4
 #: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: If a rounded multiple of pi displaces a link by more than this length (m), the finding is a warning.
+#: An angle of 1.57 instead of pi/2 displaces the links after the joint.
+#: The finding is a warning if the displacement exceeds this length (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
 #: If an angle differs from a multiple of pi by at most this number (rad), the difference is not reported.
