@@ -101,7 +101,10 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Yield results of batches and prepared evaluators that differ from single calls."""
+    """Compare the results of batches and of prepared evaluators with the results of single calls.
+
+    Yield a message for each difference.
+    """
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]

@@ -60,7 +60,7 @@ REMARKS = {
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
     "URDF508": "Both limits are zero; missing limits count as zero. Samples do not move the joint.",
     "URDF510": "The value has no effect, as expected.",
-    "URDF527": "The multiplier is -1, but both joints have equal limits; kinematics applies the mimic rule.",
+    "URDF527": "The multiplier -1 gives negative values below the limit 0; kinematics uses these values.",
     "URDF702": "No body can have this mass and these moments of inertia; kinematics uses neither.",
     "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",

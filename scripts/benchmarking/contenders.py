@@ -92,9 +92,9 @@ def urdfkin_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def urdfkin_calls(workload: Workload, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of a prepared frame.
+    """Yield the timed calls of a method, for example `robot.jacobian` and `robot.prepare(frame).jacobian`.
 
-    If `verify` is False, also yield the calls of a compiled frame.
+    If `verify` is False, also yield the calls of the same method of `robot.compile(frame)`.
     """
     robot, frame = workload.robot, workload.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(workload.result_shape(quantity))}

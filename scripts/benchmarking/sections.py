@@ -170,7 +170,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step of a batch, in ns for one configuration."""
+    """Yield the time of each step of a batch computation, in ns per configuration."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [

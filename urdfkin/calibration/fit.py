@@ -75,9 +75,9 @@ from urdfkin.verify.singular_values import singular_values
 
 #: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: The reason why a parameter stays fixed names at most this number of fitted parameters.
+#: Maximum number of fitted parameters that are named in the reason why a parameter stays fixed.
 _MAX_NAMES = 3
-#: A parameter stays fixed if fitted parameters together have the same effect on the measurements.
+#: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
 #: The reason lists these fitted parameters.
 #: A fitted parameter that contributes at most this fraction of the effect is not listed.
 _EFFECT_FRACTION = 1e-6

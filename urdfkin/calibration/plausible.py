@@ -36,15 +36,15 @@ from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, Kinem
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: Two factors for a fit whose error is a large fraction of the spread of the measured positions.
-#: The fit is not plausible if its rms position error exceeds both limits.
-#: The first limit is the first factor times the reach.
-#: The second limit is the second factor times the rms distance of the measured positions from the mean.
+#: A fit is not plausible if its error is a large fraction of the spread of the measured positions.
+#: The rms position error of such a fit exceeds two limits.
+#: The first limit is the first number times the reach.
+#: The second limit is the second number times the rms distance of the measured positions from the mean.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: Two factors for a fit that hardly reduces the error.
-#: The fit is not plausible if its rms position error exceeds both limits.
-#: The first limit is the first factor times the reach.
-#: The second limit is the second factor times the rms position error of a fit of base and tool alone.
+#: A fit is not plausible if it hardly reduces a large error.
+#: The rms position error of such a fit exceeds two limits.
+#: The first limit is the first number times the reach.
+#: The second limit is the second number times the rms position error of a fit of base and tool alone.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
@@ -67,9 +67,10 @@ _UNCERTAIN = 5.0
 #: The factor is `_NOT_WORSE` if the original fit is not plausible, or changes a joint's zero by half a turn.
 #: For a plausible original fit with a suspiciously large error, the factor is `_BETTER`.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Maximum number of corrections of one mistake after which all parameters are fitted again.
+#: Each correction of the data removes one common mistake, for example angles in degrees.
 #: For every correction, the module first computes base and tool, and the remaining error of the poses.
-#: The corrections with the smallest remaining errors are then fitted.
+#: All parameters are then fitted for the corrections with the smallest remaining errors.
+#: This number is the maximum number of these fits.
 _MAX_FITS = 4
 #: The rows of q may be shifted relative to the poses by one of these numbers of rows.
 #: The number k means that row i + k of q belongs to pose i.

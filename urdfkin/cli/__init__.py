@@ -139,7 +139,7 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for a word that names a computation without a command, for example "ik".
+#: Advice for a user who types the name of a computation that no command performs, for example "ik".
 #: Each key is the advice that urdfkin prints, and its value lists the words.
 _ABSENT = _by_word(
     {

@@ -300,7 +300,7 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
+    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):

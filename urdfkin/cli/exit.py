@@ -32,8 +32,8 @@ class Stop:
     def exit_code(self, default: int) -> int:
         """Return the exit code of a command that a signal may have stopped.
 
-        `default` is the exit code without a signal. After signal n, the exit code is 128 + n, as in shells. A
-        disagreement (`default` is 1) is more important than a signal: the exit code stays 1.
+        `default` is the exit code without a signal. After signal n, the exit code is 128 + n, as in shells.
+        The exit code 1 reports a disagreement. If `default` is 1, a signal does not change the exit code.
         """
         return default if self.signal is None or default == 1 else 128 + self.signal
 
@@ -46,7 +46,7 @@ def handle_signals() -> Iterator[Stop]:
     """
     stop = Stop()
     # `nohup` makes a process ignore SIGHUP.
-    # If urdfkin set a handler for SIGHUP in such a process, SIGHUP would stop the process.
+    # A handler of urdfkin would replace this setting, so that SIGHUP would stop the process.
     # urdfkin therefore sets a handler only for signals that still have the default handler.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 

@@ -90,7 +90,7 @@ def explain_command(topic: str | None) -> None:
       urdfkin explain 7.130
       urdfkin explain reference-frames
       urdfkin explain jacobian
-    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
+    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
     rules = (*RULES.values(), *MJCF_AND_USD_RULES.values())
     if topic is None:
         for rule in rules:

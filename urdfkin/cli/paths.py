@@ -143,9 +143,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A screw
     is a vector (w, v), with the angular velocity w first. In generated code, each screw is a column of the
-    matrix Slist (space axes) or Blist (body axes). Every command can load the TOML or JSON file that this
-    command writes. If you write such a file by hand, write the pose as `M`, and the screws as `space` or
-    as `body`.
+    matrix Slist (space axes) or Blist (body axes). The result can be written as a TOML or JSON file. Commands
+    that take a ROBOT can load this file. If you write such a file by hand, write the pose as `M`, and the
+    screws as `space` or as `body`.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """

@@ -113,7 +113,7 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
+    """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
     script = get_completion_class(shell)
     # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

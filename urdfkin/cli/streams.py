@@ -92,8 +92,9 @@ def _report_write_errors(stream: Any, descriptor: int) -> Any:
 def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    Standard input becomes write-only, and standard output becomes read-only. Reading from standard input and
-    writing to standard output therefore fail, as on a closed stream. Text for standard error is lost.
+    Reading from standard input and writing to standard output must fail, as on a closed stream. Therefore,
+    the null device is opened only for writing as standard input, and only for reading as standard output.
+    Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -174,7 +175,7 @@ class SafeStream:
     def _without_commands(self, text: str) -> str:
         """Escape CI commands in `text`.
 
-        The first characters of a command may have been written before `text`.
+        An earlier call may have written the first characters of a CI command. The rest is then in `text`.
         """
         first, *rest = text.split("\n")
         lines = [self._line_without_commands(first)]
@@ -187,8 +188,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, only the last 16 characters are stored.
-        # An "x" before them shows that they are not at the beginning of the line.
+        # Of a long line, only the last 16 characters are stored, with an additional "x" in front.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole

@@ -237,10 +237,10 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (m) between each frame of A and its match in B, at the frame's own values `z`.
+        """Return the distances (m) between each frame of A and the matching frame of B.
 
-        `z` has the shape (frames, starting points, values, variables). The result has the shape (frames,
-        starting points, values).
+        `z` contains different configurations for each frame. Its shape is (frames, starting points, values,
+        variables). The result has the shape (frames, starting points, values).
         """
         # NumPy rejects the size -1 for an empty array.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -278,7 +278,7 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 
 
 #: Maximum number of boxes in memory.
-#: With this number of boxes, the bound of one frame takes one or two seconds.
+#: With this number of boxes, `tighten` takes one or two seconds to compute a bound for one frame.
 MAX_BOXES = 2**17
 #: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BOXES_PER_BATCH = 2**16

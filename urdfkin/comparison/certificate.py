@@ -108,7 +108,10 @@ class CertifiedJoint(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """Two matched links with different poses on their rigid body; `same` reports them as different tools."""
+    """Two matching links that are fixed to matching rigid bodies in different poses.
+
+    For example, the tool link of A can be 0.1 m further along the last link than the tool link of B.
+    """
 
     a: Annotated[str, doc("Link of A.")]
     b: Annotated[str, doc("Link of B.")]

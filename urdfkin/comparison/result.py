@@ -415,7 +415,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval for the frame with the largest distance between A and B, if B is not changed.
+        """The frame with the largest distance between A and the unchanged B, and bounds on this distance.
 
         A and B are compared at equal joint values.
 
@@ -428,9 +428,9 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether rounding to single precision explains every difference in motion between the models.
+        """Whether the models differ, and single precision explains every difference in motion.
 
-        Each joint is checked separately. If the models are the same, the result is False.
+        Each joint is checked separately. For models without a difference, the result is False.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single
@@ -494,8 +494,8 @@ class Sameness(Displayable):
         Args:
             strict: If true, the exit code is 1 for models with remarks, such as different joint limits. With
                 `strict`, the verdict `Verdict.SAME_AFTER` also causes the exit code 1.
-            within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
-                are written.
+            within: Largest allowed distance (m) and angle (rad) between matching frames of the unchanged
+                models.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -574,7 +574,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with `Sameness.to_b`, because a convention cannot change joint frames",
+                    remedy="convert q with `Sameness.to_b`; a convention cannot describe this difference",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)

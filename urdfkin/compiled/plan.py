@@ -357,7 +357,7 @@ ANGLE_WIDTH = 4
 #: All other numbers are in the rows from row 19 on.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers that describe one Jacobian column in the program of a Hessian.
+#: Number of integers that describe one Jacobian column in a program that computes a Hessian.
 #: The first integer is the first scratch row of the column.
 #: The second integer is the row in `steps` of the joint to which the column belongs.
 #: The third integer is this joint's index in v.
@@ -469,8 +469,8 @@ class _ProgramWriter:
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield one event for each moving joint and each frame, in the recursion's order.
 
-        The event of a joint is (previous moving joint, joint, None). The event of a frame is (last moving
-        joint, None, frame).
+        The event for a joint is (previous moving joint, joint, None). The event for a frame is (last moving
+        joint before the frame, None, frame). The numbers are indices; the index -1 means the base.
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -483,8 +483,8 @@ class _ProgramWriter:
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
         """Add a SAVE instruction if the state after joint `step` is needed again later.
 
-        The event with the index `following` finds the state in the registers. Later events need a saved
-        state.
+        `following` is the index of the next event. At this event, the state is still in the registers. For
+        later events, the state must be saved in scratch memory.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))

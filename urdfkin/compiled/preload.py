@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 #: Thresholds (s) for the time in plain Python.
 #: The table in the module's docstring lists the action for each threshold.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: Threshold (s) for loading a kernel after the first kernel was loaded.
-#: The threshold for the first kernel is `LOAD_AFTER`.
+#: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
+#: Each further kernel is loaded when plain Python has taken this time (s).
 _LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED = 5e-5
@@ -147,8 +147,8 @@ _background: dict[str, subprocess.Popen[bytes]] = {}
 def _compile_in_background(name: str, module: str) -> bool:
     """Start a second process that compiles a kernel.
 
-    Return False if the caller must load or compile the kernel itself, and True otherwise. At most one second
-    process runs at a time, and at most one is started for each kernel.
+    Return False if the caller must load or compile the kernel itself, and True otherwise. The function starts
+    no process while an earlier process is running, and only one process for each kernel.
     """
     if kernel_cache_folder() is None:
         return False

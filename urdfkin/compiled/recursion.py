@@ -138,7 +138,7 @@ def translate_frame(axes, state, d):
 def rotate_frame(axes, state, S):
     """Return a link's state after the link's frame is rotated by S, so that R becomes R S.
 
-    The motion of the link does not change. Only the components of the motion in link axes change.
+    The motion of the link does not change. However, vectors in link axes get new components.
     """
     R, p, w, vel, alpha, acc = state
     return (

@@ -285,9 +285,9 @@ def _choose_offset(
 ) -> float:
     """Return the cell d of row i.
 
-    Usually, the result is d of the reference table's row i. In row 0 or in a prismatic joint's row, d can
-    instead make another cell equal to the reference table's cell. The other cell is d of a later row, or a of
-    a Hayati row.
+    Usually, the result is the reference table's cell d of row i. In row 0 and in the row of a prismatic
+    joint, d may be free. Then d can be chosen such that another cell equals the reference table's cell. This
+    is the cell d of a later row, or the cell a of a Hayati row.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -301,7 +301,7 @@ def _choose_offset(
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
         # One of the rows i to end - 1 may be a Hayati row.
-        # Then d is chosen so that a of the Hayati row equals the reference's a.
+        # Then d is chosen so that the Hayati row and the reference table have the same cell a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -317,10 +317,10 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return the free angle phi of row i.
+    """Return an angle phi for row i, where phi can be chosen freely.
 
-    Usually, theta of row i then equals the reference table's theta. If rows of prismatic joints follow, phi
-    can instead match theta in these rows.
+    Usually, phi makes the cell theta of row i equal to the reference table's cell. If rows of prismatic
+    joints follow, phi can instead make the cells theta of these rows equal to the reference table's cells.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:

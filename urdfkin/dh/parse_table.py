@@ -77,7 +77,7 @@ def find_table_in_text(text: str) -> dict[str, Any]:
     else:
         raise _missing_header_error(lines)
     # For a robot with the name "robot", the table's title begins with "robot:".
-    # This title is not a setting, although a setting has the same form, for example "convention: modified".
+    # Without this line, such a title would be read as a setting, for example "robot: ur5".
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
     if "convention" not in data and (convention := _find_convention(grid)):

@@ -206,7 +206,7 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace the cell that contains the joint's variable by the constant in this cell.
+    """Remove the joint's variable from a cell, so that the cell contains only a constant.
 
     For example, the cell "q3 + pi" becomes the number pi. The result also has the keys `kind` and `sense`.
     """
@@ -445,7 +445,9 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 " with the product of the two multipliers",
             )
         error = UnknownNameError("joint", row.mimic.mimicked_joint, known, where=where)
-        error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"
+        error.remedy = (
+            f"{error.remedy}; if the mimicked joint has no row, list its name in coordinates = [...]"
+        )
         raise error
 
 

@@ -30,11 +30,10 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code that a file in the language `to` contains.
+    """Return the code for an export, with exact constants if the language `to` is sympy-exact.
 
-    For the language sympy-exact, the result is the code with exact constants. For all other languages, the
-    result is `code`. Raise VerificationError if the results of the exact expressions differ from Pinocchio's
-    results.
+    For all other languages, the result is `code`. Raise VerificationError if the results of the exact
+    expressions differ from Pinocchio's results.
     """
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 

@@ -141,7 +141,8 @@ class Graph:
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that calls an equation, and stores the equation's number in each new node.
 
-        If an equation calls a second equation, all new nodes store the number of the first equation.
+        `equation` may call the function of another equation. The nodes that this function creates also store
+        the number of `equation`.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:

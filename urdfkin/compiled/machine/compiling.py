@@ -55,7 +55,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # An undamaged file may come from another version of Numba.
+            # The file's checksum is correct, but another version of Numba may have written the file.
             # Reading such a file can cause any error.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")

@@ -53,7 +53,8 @@ _MIN_CHANGE = 1e-10
 #: Suppose that n cells differ without a fit, and m cells differ after a fit.
 #: The n cells are reported only if n - m is at most this number.
 _MAX_MORE_CELLS = 2
-#: If the tip moves by less than this fraction of the path length, the reach is the path length.
+#: The reach is computed from the positions of the tip.
+#: If the tip moves by less than this fraction of the path length, `_reach` returns the path length instead.
 _FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of the last digit (metres or radians) of each cell, for each row.
 HalfDigits = Sequence[Mapping[str, float]]

@@ -52,8 +52,8 @@ _MIN_WEIGHT = 1e-9
 #: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
 #: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_WEIGHT = 1.2
-#: The first number is the initial weight of each cell beta.
-#: At each reweighting, the weights of the cells beta are multiplied by the second number.
+#: The first number is the initial weight of every cell in the column beta.
+#: At each reweighting, the weights of the column beta are multiplied by the second number.
 #: Both numbers are below 1, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
@@ -245,9 +245,9 @@ def _sparse_changes(
 ) -> FloatArray:
     """Return cell changes that remove the tip error.
 
-    After these changes, as few cells as possible differ from `start`. If the free parameters can move the tip
-    in the same way as a cell, the cell does not change. For example, a fitted joint offset moves the tip in
-    the same way as the cell theta of a revolute joint.
+    After these changes, as few cells as possible differ from `start`. A cell is not changed if a change of
+    the free parameters has the same effect on the tip. For example, a joint offset has the same effect as the
+    cell theta of a revolute joint.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)

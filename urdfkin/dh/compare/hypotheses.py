@@ -33,7 +33,8 @@ _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
 #: Each difference from the interpretation that the file states has the same cost.
-#: The cost is a sum: the tolerance, plus this fraction of the smallest difference from the URDF's shape.
+#: For each interpretation, the difference between the table's shape and the URDF's shape is computed.
+#: The cost is this fraction of the smallest of these differences, plus the tolerance at the tip (metres).
 _DIFFERENCE_COST = 0.1
 #: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
 #: A larger tip error must be at most this fraction of the reach.

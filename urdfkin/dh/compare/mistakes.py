@@ -56,11 +56,12 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes whose correction requires the smallest fit.
+        """Return the likeliest mistakes in a table.
 
         Each possible mistake is corrected in a copy of `reference`, and the copy is fitted to the URDF. The
-        smallest fit changes the fewest parameters: base, tool, joint offsets and joint signs. The result is
-        empty if no corrected table agrees after a fit of fewer parameters than `reference` needs.
+        fit can change base, tool, joint offsets and joint signs. For the likeliest mistakes, the corrected
+        table agrees with the URDF after the fewest changes. If `reference` itself agrees after equally few
+        changes, the result is empty.
 
         If `agrees` is true, `reference` agrees with the URDF after a fit. Such a table may be correct,
         because the author of a table can choose the frames. Then a corrected table must agree without a fit,

@@ -25,7 +25,8 @@ Parts = list[str | Table | Matrix]
 #: The rounding errors of a fit are far below this number.
 #: The rounding errors of numbers in data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
-#: `fit_resolution` replaces a smaller tip error by this number (rad, or metres per metre of reach).
+#: Smallest tip error that `fit_resolution` uses (rad, or metres per metre of reach).
+#: A tip error below this number is replaced by this number.
 _MIN_TIP_ERROR = 1e-12
 #: Half a unit of a cell's last digit is multiplied by this factor.
 #: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
@@ -110,8 +111,8 @@ class Mistake:
     """A likely mistake in a table.
 
     `table` is the corrected table. `fit_changes` describes the fit of the corrected table. `metres` and
-    `radians` are the tip errors after this fit. The corrected table needs a fit of fewer parameters than the
-    table with the mistake.
+    `radians` are the tip errors after this fit. To agree with the URDF, the corrected table needs changes of
+    fewer parameters than the original table.
     """
 
     kind: MistakeKind
@@ -324,8 +325,8 @@ def _verdict_lines(comparison: TableComparison) -> list[str]:
         both_ends = all(max(end.metres / comparison.reach, end.radians) > fine for end in ends)
         if comparison.agrees and not comparison.mistakes and (both_ends or zeros or reversed_):
             lines.append(
-                "These changes can hide a wrong sign. To find a wrong sign, write base, tool and zeros"
-                " into the table."
+                "These changes can hide a wrong sign. To find a wrong sign, write the true base, tool and"
+                " joint offsets into the table."
             )
     return lines
 

@@ -207,7 +207,8 @@ def _possible_transforms(
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
         shifted = shift_along_z(A, -delta)
-        # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
+        # The axis of a prismatic joint can be moved to any parallel line.
+        # If one of the two joints is prismatic, the direction of the x axis can therefore be chosen freely.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
         # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.

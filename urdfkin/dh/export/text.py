@@ -57,7 +57,7 @@ def format_variable(
 def format_coordinate_names(table: DHTable) -> str:
     """Return the names of the coordinates as text, such as "with q1 = left, q2 = right".
 
-    The text is empty if the coordinates are the joints of the rows, in the same order.
+    The text is empty if q1 is the joint of row 1, q2 is the joint of row 2, and so on.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
@@ -274,7 +274,8 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
     # `DHTable` rejects a base or a tool whose rotation is rounded to few digits.
-    # Therefore, the matrices of the printed base and tool are multiplied outside the table.
+    # Therefore, the table is evaluated without base and tool.
+    # The poses of the table are then multiplied by the rounded base and by the rounded tool.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
