@@ -72,7 +72,8 @@ _BETTER, _NOT_WORSE = 0.25, 1.5
 #: All parameters are then fitted for the corrections with the smallest remaining errors.
 #: This number is the maximum number of these fits.
 _MAX_FITS = 4
-#: The rows of q may be shifted relative to the poses by one of these numbers of rows.
+#: A common mistake is a shift of the rows of q relative to the rows of the poses.
+#: urdfkin tries these shifts (number of rows).
 #: The number k means that row i + k of q belongs to pose i.
 _SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)

@@ -473,8 +473,8 @@ def read_inputs(
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
     """Return arrays with equal numbers of rows.
 
-    The row of a one-row array is repeated until the array is as long as the longest array. Raise InputError
-    if any other array is shorter than the longest array.
+    An array with one row is repeated to the length of the longest array. Raise InputError if an array with
+    several rows is shorter than the longest array.
     """
     import numpy as np
 

@@ -152,7 +152,8 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: Largest deviation of a handwritten angle from a multiple of 15 degrees, as a fraction of 15 degrees.
+#: An angle in a table is treated as a rounded multiple of 15 degrees up to this deviation.
+#: The deviation is a fraction of 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6

@@ -30,9 +30,10 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame. No name contains characters that end a comment in the exported file.
 
-    `identifiers` contains the names that the exported code uses. The keys "q", "v" and "a" have a name for
-    each number of the input. The key "s" has a name for each joint of the path. `maybe_proof` is None for
-    code that urdfkin compiles for its own use. `exact` returns this code with exact constants.
+    `identifiers` contains the names that the exported code uses. For the keys "q", "v" and "a", there is a
+    name for each number of this input. For the key "s", there is a name for each joint of the path.
+    `maybe_proof` is None for code that urdfkin compiles for its own use. `exact` returns this code with exact
+    constants.
     """
 
     name: str

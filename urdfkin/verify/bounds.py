@@ -537,8 +537,8 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
 #: A Hessian entry is the derivative of Jacobian column i with respect to the coordinate of joint j.
 #: The joints on the path are numbered from the root.
 #: Each reference frame has two pairs of numbers: one pair for j <= i, and one pair for j > i.
-#: The first number of a pair counts the products z x (z x d) of two revolute joints.
-#: The second number of a pair counts the products z x z of a revolute joint and a prismatic joint.
+#: The first of the two numbers counts the products z x (z x d), which occur for two revolute joints.
+#: The second number counts the products z x z, which occur for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -617,7 +617,8 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
     the oracle computes.
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # If s is not larger than the rounding error of s, the scale is not finite, and no result is accepted.
+    # Here s is the sine minus its rounding error. If s is not positive, the scale becomes infinite.
+    # The comparison accepts no result with an infinite scale.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -633,8 +634,8 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     velocity Jacobian. Let delta be the error of R. The elements of the matrix 4 q q^T are linear functions of
     R. The longest row of this matrix has a length of at least 2. The error of this row is below 4.6 delta, so
     the error of q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an
-    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|. The bound on the angular rows of the
-    velocity Jacobian is also 2 delta |w|, so this bound is valid for the derivative of q.
+    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|. The angular rows of the velocity
+    Jacobian have the bound 2 delta |w|. Therefore, the derivative of q has the same bound.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 

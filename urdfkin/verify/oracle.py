@@ -213,7 +213,7 @@ class PinocchioLayout:
         return couple_columns(full, self._columns, self._index, self._factor, self.nv)
 
 
-#: Pinocchio's name of the world, the parent of a root joint.
+#: Name that Pinocchio gives to the world. The world is the parent of a root joint.
 WORLD = "universe"
 _PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
 

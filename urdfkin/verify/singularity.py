@@ -79,9 +79,9 @@ class Singularity(Displayable):
         rank: Number of singular values with a lower bound above 0.
         full_rank: Largest possible rank: the smaller of the numbers of rows and columns.
         smallest_value_bound: Upper bound on the smallest singular value.
-        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. If the
-            frame never moves in some directions that depend on q or on a moving base, urdfkin cannot
-            determine the lost directions. The array is then empty.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. The
+            array is empty if urdfkin cannot determine them. This happens if the frame cannot move in some
+            directions in any configuration, and these directions depend on q or on a moving base.
         null_motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons of the loss.
 

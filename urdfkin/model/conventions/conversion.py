@@ -188,7 +188,7 @@ class Conversion:
     ) -> list[int]:
         """Return the joints breadth first; siblings are in the order of their keys.
 
-        If `merged` is true, links that fixed joints connect count as one link.
+        If `merged` is true, two links count as one link if a fixed joint connects them.
         """
 
         def below(link: int) -> list[int]:

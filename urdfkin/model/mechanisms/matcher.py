@@ -83,9 +83,11 @@ class LookAhead:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPair:
-    """A body of A and the corresponding body of B; the matcher reached them through the joints `via`.
+    """A body of A and the corresponding body of B.
 
     Attributes:
+        via: The joint of A and the joint of B through which the matcher reached the bodies; None without a
+            joint.
         G: (4, 4) motion of A's body from its zero configuration to the current pose of B's body.
         XC: (4, 4) motion of B's body from its zero configuration to its current pose.
     """
@@ -782,7 +784,7 @@ def _best_alignment(
 
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
-#: Tolerance of a zero offset, divided by the angle tolerance.
+#: Tolerance of a joint's zero offset, as a multiple of the angle tolerance.
 #: The factor is large, because urdfkin computes a zero offset from the axes of two joints.
 #: If these axes are close to each other, the computed zero offset is inexact.
 OFFSET_FACTOR = 1e4

@@ -320,7 +320,7 @@ def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after the motions of a joint; see the module docstring."""
-    # A planar or floating joint has no limits, so the joint may rotate d into any direction.
+    # The rotation of a planar or floating joint has no limits, so the bound allows every direction of d.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.lengths)
@@ -585,8 +585,8 @@ def relevant_joints(
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
     Let joint i be the first joint on the path that differs between A and B. A joint before joint i usually
-    does not change the length of D. An exception is a joint whose variable also moves a later joint of the
-    result. The result begins with the first exception, or with joint i if no exception exists.
+    does not change the length of D. However, the variable of an earlier joint may also move a later joint of
+    the result. The result begins with the first joint of this kind, or with joint i if there is none.
     """
     steps, pairs = (
         alignment.path(frame.previous),
