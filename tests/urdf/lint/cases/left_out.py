@@ -99,6 +99,6 @@ CASES = [
     Mjcf(
         "shapes-lights-and-motors",
         _two(inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>', more=_MOTOR),
-        f"MJCF102 {_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights",
+        f"MJCF102 {_USELESS}1 actuator, 2 geoms, 1 camera, 1 light",
     ),
 ]  # fmt: skip
