@@ -187,7 +187,7 @@ def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 def truncate_program(program: KernelProgram, parts: int) -> KernelProgram:
-    """Return a program with only the instructions of its first `parts` steps."""
+    """Return a copy of a program that contains only the instructions of the first `parts` steps."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
     code = words[words[ProgramHeader.CODE] :].reshape(-1, INSTRUCTION_WIDTH)

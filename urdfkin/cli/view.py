@@ -136,7 +136,7 @@ PANELS = (
     "start",
     default="neutral",
     metavar="VALUES",
-    help="With --to: configuration at the start of the line, in the format of --q of other commands.",
+    help="With --to: first configuration of the motion, in the format of --q of other commands.",
 )
 @click.option(
     "--to",

@@ -1,10 +1,10 @@
-"""The equations of motion of sections 7.3 to 7.7 of the textbook, each written once for every kind of number.
+"""The equations of motion of sections 7.3 to 7.7 of the textbook, for all kinds of numbers.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
-because the equations use the arithmetic of their arguments. For NumPy arrays and for lengths of vectors,
-`urdfkin.kinematics.number_kinds` replaces the functions of the section "vectors". The same equations run on
+because the equations use the arithmetic of their arguments. Each equation is written only once. It runs on
 batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and LaTeX
-expressions.
+expressions. For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the
+functions of the section "vectors".
 
 All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
 own axes. In the link's own axes, z is (0, 0, 1) and d is constant.

@@ -194,7 +194,7 @@ def _pinocchio_placements(
         found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_MAX_NAMES])
         raise OracleError("the reader finds different joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
-        raise OracleError("the reader does not find a body of the file", found=missing[0])
+        raise OracleError("the reader does not find one of the bodies in the file", found=missing[0])
     data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
     ids = [int(model.getFrameId(name, pin.FrameType.BODY)) for name in bodies]
     for k, numbers in enumerate(qpos):

@@ -831,7 +831,10 @@ class _Rule:
 
 
 def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return {name in A: (sign, zero offset)} for joints whose zero offset the mimic rules determine."""
+    """Return sign and zero offset of each joint for which the mimic rules determine the zero offset.
+
+    The keys are the joint names of A.
+    """
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
