@@ -21,8 +21,8 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Names of the two measured times (ms) of a quantity's first call in a process.
-#: For the first time, the kernel cache is empty; for the second time, the cache contains all kernels.
+#: Names of two times (ms): a process computes a quantity for the first time.
+#: In one process, the kernel cache is empty. In the other process, the cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
 #: Methods of `Robot` whose first call compiles a kernel, each with the number of its inputs.
 #: Number of inputs 1: q; 2: q and v; 3: q, v and a.

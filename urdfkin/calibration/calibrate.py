@@ -147,7 +147,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """(p,) change of each parameter in the written fit, m and rad."""
+        """(p,) change of each parameter in the file that is written, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property

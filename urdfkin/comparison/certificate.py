@@ -136,8 +136,8 @@ class FrameEntry(TypedDict):
     lower: Annotated[
         Size,
         doc(
-            "Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`, minus"
-            " the largest rounding error."
+            "Lower bound of the largest distance, metres: the computed distance if A is at `q_a` and B is at"
+            " `q_b`, minus the largest rounding error."
         ),
     ]
     upper: Annotated[
@@ -207,8 +207,8 @@ class SameCertificate(Header):
     as_written: Annotated[
         FrameEntry | None,
         doc(
-            "Interval for the frame with the largest distance between the unchanged models; null if B needs"
-            " no changes."
+            "The frame with the largest distance between the unchanged models, and an interval of this"
+            " distance; null if B needs no changes."
         ),
     ]
     checked: Confirmed

@@ -319,7 +319,7 @@ def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
 
 def _base_state(axes, m, s, args, row, b):
-    """Return the motion of the base in the world, as the state of a link."""
+    """Return the state of the root link, which moves with the base."""
     nil, unit = broadcast(0.0), broadcast(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil

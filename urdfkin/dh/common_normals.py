@@ -418,7 +418,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Return the sum (rad) of the tilts that a table sets to zero as rounding errors.
+    """Return the sum (rad) of all tilts that a table replaces by zero, because they are rounding errors.
 
     The orientation error that these tilts cause is at most this sum.
     """

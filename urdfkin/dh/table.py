@@ -240,9 +240,9 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """The change of one angle that was rounded to a multiple of 15 degrees.
+    """The effect of one angle that urdfkin rounded to a multiple of 15 degrees.
 
-    The change rotates the rest of the chain about a point.
+    The rounding rotates the rest of the chain about a point.
 
     Attributes:
         row: Index of the changed row, from 0. The index -1 means the base, and the index n means the tool of

@@ -238,8 +238,8 @@ SINGLE_POLYNOMIAL = 1.0
 #: The standard deviation of the difference is 2.4 eps, so 13.7 is nearly six standard deviations.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Sum of the rounding errors (in eps) in the directions of two joint axes.
-#: For each axis, the division by the axis's length has an error of 0.5.
-#: Rodrigues' formula adds an error of 2.0 for each axis.
+#: For each axis, the division by the axis's length has an error of 0.5 eps.
+#: Rodrigues' formula adds an error of 2.0 eps for each axis.
 AXIS_ROUNDINGS = 5.0
 #: Error (in eps) of the angle between consecutive joint axes, for each joint.
 #: The program that wrote a robot's file rounded the angles in this file.

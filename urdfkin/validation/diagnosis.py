@@ -118,7 +118,7 @@ Mistake = tuple[str, Callable[[], FloatArray]]
 
 @dataclass(frozen=True)
 class Mistakes:
-    """Common mistakes of a function that computes one quantity of one frame in a convention."""
+    """Common mistakes in a user's function, which computes a quantity of a frame."""
 
     robot: Robot
     row: Quantity

@@ -681,8 +681,9 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Return a bool array (frames, 6, nv) that is False for Jacobian entries that are always 0.
 
-    A False entry is 0 for every q. In LOCAL and LOCAL_WORLD_ALIGNED, it is also 0 for every motion of the
-    base. `root_at_origin` states whether the root link is at the world's origin; only WORLD uses this.
+    A Jacobian entry that is marked False is 0 for every q. In LOCAL and LOCAL_WORLD_ALIGNED, the entry is
+    also 0 for every motion of the base. `root_at_origin` states whether the root link is at the world's
+    origin; only WORLD uses this argument.
 
     The linear rows of a revolute joint's column are z x d. In WORLD, d leads from the joint to the world's
     origin. In the other reference frames, d leads from the joint to the frame. The vector d is 0 for every q

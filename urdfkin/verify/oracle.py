@@ -106,8 +106,8 @@ _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 class _JointIndices(NamedTuple):
     """Indices of one joint in the vectors of Pinocchio and of urdfkin.
 
-    `full_q` and `full_v` are the joint's first indices in Pinocchio's q and v. `q` and `v` are the first
-    indices in urdfkin's q and v. For a mimic joint, `q` and `v` belong to the mimicked joint.
+    `full_q` and `full_v` are the indices of the joint's first numbers in Pinocchio's vectors. `q` and `v` are
+    the same indices in urdfkin's vectors. For a mimic joint, `q` and `v` belong to the mimicked joint.
     """
 
     sizes: tuple[int, int]

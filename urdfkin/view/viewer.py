@@ -42,7 +42,7 @@ from urdfkin.view.stage import (
 _UNLIMITED = 100.0
 #: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
-#: Minimum number of steps between the two ends of a slider for a length, such as that of a prismatic joint.
+#: Minimum number of steps of a slider that sets a length, for example the value of a prismatic joint.
 #: The size of a step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2

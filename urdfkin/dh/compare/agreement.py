@@ -235,7 +235,10 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_hidden_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell whose error is hidden by a fit of base, tool and joint offsets."""
+    """Return row and name of each hidden cell.
+
+    A fit of base, tool and joint offsets can compensate an error of a hidden cell.
+    """
     hidden = []
     for i, k in find_hidden_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])

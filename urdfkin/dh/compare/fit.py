@@ -144,9 +144,9 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) from a model's poses to the target poses.
+        """Return a twist from each pose of a model to its target pose, as one array of 6 s numbers.
 
-        The angles are multiplied by `scale`.
+        s is the number of poses. The angles are multiplied by `scale`.
         """
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
