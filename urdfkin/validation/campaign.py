@@ -42,7 +42,10 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A file of a store is damaged or has an unknown name; `validate` computes lost results again."""
+    """A file of a store is damaged or has an unknown name.
+
+    Lost results are computed again.
+    """
 
 
 def validate(
@@ -193,7 +196,10 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _can_be_loaded(robot_input: RobotInput) -> bool:
-    """Return whether a robot can be loaded; if not, the robot's first chunk reports the error."""
+    """Return whether a robot can be loaded.
+
+    If not, the robot's first chunk reports the error.
+    """
     try:
         robot_input.load()
     except Exception:
@@ -202,7 +208,7 @@ def _can_be_loaded(robot_input: RobotInput) -> bool:
 
 
 def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; the report of an incomplete store is marked as interrupted."""
+    """Return a store's report; an incomplete run is marked as interrupted."""
     store = Store.open_read_only(Path(folder), _warn)
     store.check_names()
     manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()

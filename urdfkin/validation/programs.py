@@ -179,7 +179,7 @@ class Program:
                 stream.close()
 
     def _ask(self, request: bytes) -> bytes:
-        """Write a request, and return the answer's line; the timeout covers writing and reading."""
+        """Write a request and read the answer, within the timeout."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -224,9 +224,9 @@ class Program:
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Parse the program's answer.
+        """Return the answer as a dictionary.
 
-        Raise ProgramError unless the answer contains an entry `result`, or an entry `error` that is a text.
+        Raise ProgramError unless the answer has a `result`, or an `error` that is a text.
         """
         try:
             answer = json.loads(line)

@@ -39,7 +39,7 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return the versions of `LIBRARIES`, a digest of urdfkin's code, and a digest of the equations.
+    """Return library versions, and digests of code and equations.
 
     The digest of the code does not include the packages in `_DISPLAY`.
     """
@@ -212,8 +212,7 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The commands that repeat the run, one on each line.
 
-        Robots with the same options share a command. If the user passed a robot as text, a command must read
-        this robot from standard input. A command can read only one such robot.
+        Robots with the same options share a command. A command can read only one robot from standard input.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
