@@ -101,7 +101,7 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of an unpacked file, bytes; no answer of urdfkin is larger.
+#: Maximum size of an unpacked file, bytes.
 _MAX_BYTES = 2**27
 
 

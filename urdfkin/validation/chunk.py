@@ -41,14 +41,14 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
-#: Maximum number of random configurations in one draw; each draw has its own seed.
+#: Maximum number of random configurations in one draw.
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
+#: Minimum number of chunks of a robot with 200 or more samples.
 _MIN_CHUNKS = 8
-#: Maximum number of draws in a chunk; a draw has at most DRAW_SIZE random configurations.
-#: For a typical robot, 40 draws take one second and give a few kilobytes of results.
+#: Maximum number of draws in a chunk.
+#: For a typical robot, 40 draws take one second.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -249,8 +249,8 @@ class _Block(_ComparisonBatch):
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
-        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
-        # In the list of frames, the links come first, beginning with the root.
+        # A joint and its child link have the same Jacobian.
+        # The links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -353,8 +353,8 @@ def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> Fl
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: The cache contains only the latest robot. A worker gets the chunks of a robot one after another.
-#: Two large robots in the cache would need too much memory.
+#: The cache contains only the latest robot.
+#: Two large robots would need too much memory.
 _cache: dict[RobotInput, _Models] = {}
 
 

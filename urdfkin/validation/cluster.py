@@ -38,18 +38,18 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _PER_THREAD * threads + _MORE chunks are sent and not answered at any time.
-#: The number of threads is the sum over all workers.
-#: The limit is high enough that every thread always has a next chunk.
+#: Maximum number of unanswered chunks: _PER_THREAD * threads + _MORE.
+#: `threads` is the sum over all workers.
+#: Every thread then always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
-#: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: A high number is safe, because a robot cannot crash a Dask worker.
+#: Maximum number of times that a chunk is sent.
+#: A high number is safe: robots cannot crash Dask workers.
 #: The worker runs each chunk in a separate process.
 _TRIES = 20
-#: Seconds after which the number of workers is read again.
+#: Interval for counting the workers, s.
 _INTERVAL = 1.0
 #: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, the package must have the same version as in this process.
+#: Packages of the scheduler that need the same version as here.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -209,9 +209,9 @@ class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
         #: Sent chunks without an answer.
-        #: Each value contains the task of the chunk and the number of times that the chunk was sent.
+        #: Task of each chunk, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, a future of the text that describes the robot. The workers store this text.
+        #: Text of each robot, stored on the workers.
         self._robots: dict[int, Future[bytes]] = {}
         #: Number of chunks without an answer for each robot.
         self._in_use = Counter[int]()

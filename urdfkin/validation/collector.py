@@ -155,8 +155,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # If chunks failed, the report contains only the results of the chunks before the first failed chunk.
-        # Which later chunks are finished depends on the speed of the workers.
+        # The report contains the results before the first failed chunk.
+        # The finished later chunks depend on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains the user's results if `Diagnosis.remainder` is at most this number.
+#: Largest `Diagnosis.remainder` that explains the user's results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
-#: A fast first test for exchanged joints uses only this number of configurations.
-#: If an exchange of two joints explains these results, a second test uses all configurations.
+#: Number of configurations in a fast first test for exchanged joints.
+#: A second test then uses all configurations.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
-#: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
+#: Numbers are equal within _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
-#: Indices that change the rows [linear; angular] of a result to [angular; linear], and vice versa.
+#: Indices that exchange the linear and the angular rows.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -113,8 +113,8 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A common mistake: a sentence that describes the mistake, and a function without arguments.
-#: The function applies the mistake to urdfkin's results, and returns the changed results.
+#: A common mistake: a sentence, and a function without arguments.
+#: The function returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 

@@ -21,7 +21,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks in an executor's queue: enough for many workers, and few enough to save memory.
+#: Maximum number of chunks in an executor's queue.
 IN_FLIGHT = 512
 
 
@@ -33,7 +33,7 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Function that an engine calls with a task and its answer. A task has at most one answer.
+#: Callback for a task and its answer, at most once per task.
 AnswerCallback = Callable[[Task, Answer], None]
 
 

@@ -24,7 +24,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_disagreements
 
-#: The libraries of a cross check, in the order of the columns of tables.
+#: The libraries of a cross check, in the order of columns.
 CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 
@@ -129,7 +129,7 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
         return Bound(size / second.k, second.k)
 
 
-#: Edges of the histogram of disagreements, in eps * scale: ten bins per decade from 0.001 to 100,000.
+#: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 #: Key of error statistics: the quantity and the reference frame.
 Key = tuple[str, str]

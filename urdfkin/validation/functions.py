@@ -44,9 +44,9 @@ if TYPE_CHECKING:
 _BATCH_SIZE = 256
 #: Number of configurations in a diagnosis.
 _DIAGNOSIS_SAMPLES = 48
-#: Maximum number of stored messages about exceptions and wrong shapes.
+#: Maximum number of stored error messages.
 _MAX_MESSAGES = 5
-#: A relative difference up to this value can be the effect of rounding to single precision.
+#: Largest relative difference that single precision can cause.
 _SINGLE_PRECISION = 1e-5
 
 

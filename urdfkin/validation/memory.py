@@ -18,15 +18,15 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum number of bytes of one array with the results of a block of frames.
-#: At most _ARRAYS such arrays are in memory at the same time.
+#: Maximum size of one array of results, bytes.
+#: At most _ARRAYS such arrays exist at the same time.
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
+#: Workspace of Pinocchio 4.1.0: _PER_CUBE * nv^3 + _PER_LINK * links, bytes.
 #: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
+#: Maximum number of arrays in memory at the same time.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -101,7 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
-            # The kernel counts cached files as used memory, but frees inactive cached files on demand.
+            # The kernel frees inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum number of quoted bytes of the program's standard error.
+#: Maximum number of quoted bytes of standard error.
 _MAX_ERROR_BYTES = 300
-#: Number of consecutive failures after which the program is not started again.
+#: Maximum number of consecutive failures.
 _MAX_FAILURES = 3
 _DAY = 86400.0
 
@@ -149,7 +149,7 @@ class Program:
             answer = self._parse_answer(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A delayed answer would be read as the answer to the next request.
+            self._stop()  # A delayed answer would belong to the wrong request.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):

@@ -21,10 +21,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run` for a chunk: a pair of a word and data.
-#: "answer": the chunk was computed; the data are the pickled answer.
-#: "died": the chunk crashed two processes; the data name the signal or exit status of the second crash.
-#: "other code": the worker's versions or digests differ from the client's; the data are the worker's.
+#: Return value of `run`: a word and data.
+#: "answer": the pickled answer of the chunk.
+#: "died": signal or exit status of the second crash.
+#: "other code": different versions or digests of the worker.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

@@ -103,7 +103,7 @@ class RobotReport:
         if (case := self.error_stats[key].case) is None:
             return None
         row = QUANTITIES[quantity]
-        # The prefix "joint:" is needed because a link may have the same name.
+        # A link may have the same name as a joint.
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})

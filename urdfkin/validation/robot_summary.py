@@ -91,7 +91,7 @@ def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
     return {"lower": lower, "upper": upper, "by": narrowed.mimic_joints}
 
 
-#: Maximum number of chains in a summary; `urdfkin dh --all` lists all chains.
+#: Maximum number of chains in a summary.
 MOST = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")

@@ -58,17 +58,17 @@ if TYPE_CHECKING:
 
 #: Name and version of the layout of a store.
 _LAYOUT = "urdfkin-campaign/1"
-#: Maximum number of differences between two campaigns that an error lists.
+#: Maximum number of listed differences between two campaigns.
 _MAX_DIFFERENCES = 4
 _MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
 _SCRATCH = ".writing"
 #: File with the settings of the accuracy study.
 _STUDY_FILE = "accuracy.json"
-#: Suffix of a file with the accuracy result of a robot.
+#: Suffix of files with accuracy results.
 _STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
-#: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
+#: Number of attempts to acquire a lock, 0.1 s apart.
 _TRIES = 10
 
 _T = TypeVar("_T")
@@ -417,7 +417,7 @@ def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # To test whether the lock is free, another process may hold the lock for a moment.
+        time.sleep(0.1)  # Another process may hold the lock briefly to test it.
     raise InputError(
         "another process uses this store",
         where=str(folder),

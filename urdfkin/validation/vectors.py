@@ -58,17 +58,17 @@ from urdfkin.verify.quantities import (
 )
 
 #: Version of the file format of the test vectors.
-#: Programs that read version 1 can read all versions 1.x, but not version 2.
+#: Programs that read version 1 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
-#: If a joint's limits exclude zero, the joint is at the limit nearest to zero.
+#: If the limits exclude zero, the joint is at the nearest limit.
 SAMPLES = 3
-#: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
-#: Random positions of planar and floating joints are in the same interval.
+#: Range of random velocities and accelerations.
+#: Planar and floating joints have positions in the same range.
 _RANGE = 2.0
-#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
-#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
+#: Inputs are rounded to multiples of 1 / _GRID.
+#: Exceptions are quaternions and limits. Multiples of 1 / 1024 are exact as decimals and doubles.
 _GRID = 1024.0
 #: A tolerance is first rounded to 12 significant digits.
 #: Then the tolerance is rounded upward to 3 significant digits.
@@ -80,9 +80,9 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The vectors use the error bound of the classical acceleration for the spatial acceleration too.
-#: The two accelerations differ by the cross product of angular and linear velocity.
-#: The error bound of the classical acceleration includes the error of this product.
+#: Spatial accelerations have the bound of classical accelerations.
+#: They differ by the cross product of angular and linear velocity.
+#: The bound includes the error of this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip

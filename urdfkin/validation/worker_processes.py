@@ -38,7 +38,7 @@ from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, W
 
 #: Module with the function `serve`, which each worker process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time (seconds) between the end of a worker's pipe and the end of its process.
+#: Maximum time for the end of a worker, s.
 _GRACE = 5.0
 
 
@@ -170,8 +170,8 @@ class _WorkerPool:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Tasks of each robot that crashed a process: the task that crashed, and the remaining tasks.
-        #: These tasks run after the tasks of all other robots.
+        #: Tasks of each robot that crashed a process.
+        #: These tasks run after all others.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
