@@ -44,7 +44,7 @@ _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup without elements.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: Tags of MJCF elements whose findings contain no name.
-#: Each tag has another tag for the finding.
+#: Keys are tags in the file; values are tags in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Beginning of a prim in a USD text file, or a delimiter.
 #: Delimiters are parentheses, braces, comments, strings, references and arrays.
