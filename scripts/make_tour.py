@@ -137,7 +137,6 @@ def plot_euler_singularity(figure: Any) -> None:
 
 
 def plot_convergence(figure: Any) -> None:
-
     def angles(t: float) -> FloatArray:
         return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])
 

@@ -104,7 +104,7 @@ _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true
 
 
 class RefusalError(Exception):
-    """A converter refuses a robot."""
+    """A robot cannot be converted or compared."""
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
@@ -188,7 +188,7 @@ def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> 
 
 
 def _load(file: Path) -> urdfkin.Robot:
-    """Load several articulations as one robot."""
+    """Load a file; several articulations become one robot."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

@@ -133,7 +133,10 @@ def measure_rows(
 
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library."""
+    """The lines of Python that call a library.
+
+    The timed loop contains the lines, without another function call.
+    """
 
     label: str
     #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.

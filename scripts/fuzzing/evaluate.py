@@ -186,7 +186,6 @@ def _compare_calls(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Compare calls for one and for several frames."""
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:

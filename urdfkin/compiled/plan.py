@@ -147,7 +147,10 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Compile the joints that move the given links."""
+    """Compile the joints that move the given links.
+
+    Results are in the order of `links`.
+    """
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:
@@ -313,8 +316,8 @@ class ProgramHeader(IntEnum):
     | index | integer |
     |---|---|
     | CODE | index of the first instruction |
-    | BLOCKS_Q, BLOCKS_V | index of the first block of q or v; a block has eight numbers |
-    | BLOCKS_END | end of the blocks of v |
+    | BLOCKS_Q, BLOCKS_V | beginning of the list of blocks of q or v, eight numbers each |
+    | BLOCKS_END | end of the list of blocks of v |
     | ANGLES, ANGLES_END | beginning and end of the list of joint angles |
     | Q, V, A, BASE | first scratch row of each input |
     """
