@@ -136,7 +136,6 @@ def make_reports_parts() -> dict[str, str]:
 
 
 def _format_type(entry: dict[str, Any]) -> str:
-    """Format a type, such as `list of Check`."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:

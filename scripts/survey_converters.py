@@ -108,7 +108,6 @@ class RefusalError(Exception):
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Return the tool's input file and output file."""
     reads, program, writes = TOOLS[tool]
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
