@@ -127,7 +127,6 @@ def report_makers(folder: Path) -> dict[str, Callable[[], str]]:
         return as_html(validate(robots, samples=samples).as_dict())
 
     def make_disagreement() -> str:
-        """Make a report with disagreements: Pinocchio's velocities are multiplied by 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
             return make_report(["panda", "ur5"], 6)
 
@@ -156,7 +155,6 @@ def make_same_report(b: str, within: float | None) -> str:
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:
-    """Yield the pages of a report of all robots."""
     document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
     texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}

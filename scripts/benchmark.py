@@ -55,7 +55,6 @@ QUICK = BenchmarkSize(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100,
 def measure_sections(
     size: BenchmarkSize, sections: Sequence[str], contenders: Sequence[Contender]
 ) -> dict[str, Any]:
-    """Measure everything; raise DifferenceError if two libraries have different results."""
     name, frame = ROBOT_FRAMES[0]
     n, rounds = size.configurations, size.rounds
     rows: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.

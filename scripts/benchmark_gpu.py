@@ -137,7 +137,6 @@ def make_table(measured: Iterable[dict[str, Any]]) -> str:
 
 
 def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
-    """Yield a JSON line for each measurement with PyTorch; raise ValueError for a wrong result."""
     try:
         import torch
         from torch.utils.benchmark import Timer
@@ -167,10 +166,6 @@ def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda
 
 
 def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
-    """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
-
-    Raise ValueError if the Jacobians of PyTorch Kinematics and urdfkin differ.
-    """
     import pytorch_kinematics
     import torch
 

@@ -20,7 +20,7 @@ _NO_CHANGELOG = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class NoBaseError(Exception):
-    """The branch cannot be compared with main; the message states the reason."""
+    """HEAD cannot be compared with main."""
 
 
 def run_git(root: Path, *words: str) -> str:
@@ -34,7 +34,6 @@ def run_git(root: Path, *words: str) -> str:
 
 
 def find_branch_point(root: Path) -> str:
-    """Return the commit at which HEAD left main."""
     head = run_git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
         try:

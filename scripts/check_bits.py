@@ -55,8 +55,6 @@ Arrays = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class RobotInputs:
-    """A robot, its inputs and its frames: the tip, and some frames of the whole tree."""
-
     name: str
     robot: Robot
     inputs: tuple[FloatArray, ...]
@@ -101,10 +99,7 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Compare the results of batches and of prepared evaluators with the results of single calls.
-
-    Yield a message for each difference.
-    """
+    """Yield a message for each difference."""
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]
@@ -165,7 +160,7 @@ def digest(now: Arrays) -> str:
 
 
 def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference from the stored result as a fraction of the stored bound."""
+    """Return the difference as a fraction of the bound."""
     if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])

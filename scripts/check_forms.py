@@ -61,7 +61,7 @@ _DOCUMENT = r"""\documentclass{article}
 
 
 class MissingProgramError(Exception):
-    """An interpreter or a library of a format is not installed."""
+    """An interpreter or a library is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return how much wider (points) each LaTeX table is than the text of an `article`; 0 if it fits."""
+    """Return each table's excess width (points)."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -196,9 +196,10 @@ def _find_program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A Denavit-Hartenberg table, some configurations, and the tip's poses that Pinocchio computes.
+    """A table with poses from Pinocchio.
 
-    The poses are relative to the base frame of the table.
+    Attributes:
+        pinocchio_poses: Tip poses relative to the table's base.
     """
 
     name: str
@@ -210,10 +211,11 @@ class Case:
         return self.job.table
 
     def measure_errors(self, found: FloatArray) -> tuple[float, float]:
-        """Return two errors of the poses `found`, which the exported code computes.
+        """Compare poses with Pinocchio and with urdfkin.
 
-        The first error is the largest difference (m) of a coordinate from Pinocchio's tip position. The
-        second error is the largest difference from urdfkin's poses, divided by the bound on rounding errors.
+        Returns:
+            Largest position error against Pinocchio (m).
+            Largest error against urdfkin, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # Sine and cosine have rounding errors, so the bound is not zero even if all lengths are zero.
@@ -240,7 +242,6 @@ def make_case(robot: Robot, name: str, table: DHTable) -> Case:
 
 
 def can_represent(form: str, table: DHTable) -> bool:
-    """Return whether a format can represent the table."""
     if form in LANGUAGES:
         return True
     try:

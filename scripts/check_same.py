@@ -42,7 +42,7 @@ ROUNDING = 1e-10
 
 
 def check_pair(name: str, change: str) -> dict[str, Any] | None:
-    """Check one change of one robot; return None if the change is impossible."""
+    """Return None if the change is impossible."""
     a, b = robot(name), changed(name, change)
     if b is None:
         return None

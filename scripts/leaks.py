@@ -41,7 +41,6 @@ def use_robot(k: int, folder: Path) -> None:
 
 
 def measure_usage() -> dict[str, float]:
-    """Return the resident memory (MiB), the open descriptors and the number of objects."""
     gc.collect()
     here = psutil.Process()
     memory = here.memory_info().rss / 2**20

@@ -48,7 +48,7 @@ def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str
 
 
 def _robot(*joints: str) -> str:
-    """Return a robot with links `base`, `l1`, `l2`, `l3`; MuJoCo does not merge the links."""
+    """Return a robot whose links MuJoCo does not merge."""
     links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
     compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
@@ -105,7 +105,6 @@ Readings = Mapping[str, FloatArray]
 
 
 def find_definition(found: FloatArray, readings: Readings) -> str:
-    """Return the only definition that matches a result."""
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
     ]
@@ -119,7 +118,7 @@ Row = tuple[str, str, str, str]
 
 
 class MeasuredMotion:
-    """One motion of one robot, computed by each library and by difference quotients."""
+    """A motion, computed by libraries and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
         rng = np.random.default_rng(seed)
@@ -141,11 +140,11 @@ class MeasuredMotion:
         self.body = self.mj_model.body("l3").id
 
     def path(self, t: float) -> FloatArray:
-        """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""
+        """Return T_world_frame at time t."""
         return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
 
     def motion(self) -> tuple[FloatArray, ...]:
-        """Return R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
+        """Return (R, p, velocity, w, acceleration, alpha), in world axes."""
         h = 1e-3
         T = {i: self.path(i * h) for i in (-2, -1, 0, 1, 2)}
         rate = (T[-2] - 8.0 * T[-1] + 8.0 * T[1] - T[2]) / (12.0 * h)

@@ -115,11 +115,7 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Measure the given libraries, and return the page's data with the new results.
-
-    `before` contains the earlier results of all libraries. The results of libraries that are not measured
-    remain.
-    """
+    """Return `before` with new results of the given libraries."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}

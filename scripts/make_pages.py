@@ -136,7 +136,6 @@ def make_reports_parts() -> dict[str, str]:
 
 
 def _format_type(entry: dict[str, Any]) -> str:
-    """Return a type as text, such as `number or null` or `list of Check`."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:
@@ -260,7 +259,7 @@ def _chain_rows() -> Iterator[tuple[object, ...]]:
 
 
 def _compute_enclosures(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return interval results of random motions, and the processor time (ms) per motion."""
+    """Return enclosures, and the time (ms) per motion."""
     enclosures, times = [], []
     for seed in (0, *range(count)):  # The first motion is not timed.
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))

@@ -68,9 +68,9 @@ def measure_seconds(words: Sequence[str], cache: Path | None) -> float:
 
 
 def measure_medians(rounds: int, folder: Path) -> list[float]:
-    """Return the median processor time (s) of each row.
+    """Return each row's median processor time (s).
 
-    The times of the first round do not count, because Python then compiles the modules to bytecode.
+    In the first round, Python compiles the modules to bytecode.
     """
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())

@@ -77,10 +77,7 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the tests that mention a module, and the tests of the module's package.
-
-    If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
-    """
+    """Return the tests of a module and its package."""
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -113,7 +110,6 @@ class NamedMutant:
 
     @property
     def file(self) -> Path:
-        """The file that contains the code to replace."""
         path = ROOT
         for name in self.function.split("."):
             if not (path / name).is_dir():
@@ -124,7 +120,7 @@ class NamedMutant:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """The last three arguments of `replace_code`: the function's name, the old code and the new code."""
+        """The last three arguments of `replace_code`."""
         return self.function[len(module_name(self.file)) + 1 :], self.before, self.after
 
 
@@ -135,10 +131,7 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Read the harmless mutants from docs/mutation.md, each with the reason why it is harmless.
-
-    A key is a pair: the full name of the mutated function, and a text such as `1  ->  2`.
-    """
+    """Read docs/mutation.md: {(function, change): reason}."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -156,7 +149,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a mutant: `detected` by a test, `survived`, `too slow`, or `harmless`."""
+    """A mutant's result: `detected`, `survived`, `too slow` or `harmless`."""
 
     mutant: Mutant
     result: str
@@ -221,7 +214,6 @@ def _run_in_process(change: dict[str, str], tests: list[str], timeout: float) ->
 
 
 def _run_tests(change: dict[str, str], tests: list[str], output: str) -> None:
-    """Run the tests on a mutant in this process and its children, and exit with pytest's code."""
     import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"

@@ -54,12 +54,11 @@ def describe_machine() -> dict[str, object]:
 
 
 def measure_memory(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
-    """Return the peak memory of computing `n` results, and the size of the results, in bytes."""
+    """Return the peak memory and the result's size (bytes)."""
     return _run_in_process("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
 
 
 def measure_first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of each quantity's first call, with an empty and with a full kernel cache."""
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:

@@ -33,11 +33,11 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number without a value, which records the operation that yields the number.
+    """A number that records an operation instead of a value.
 
-    The field `operands` contains the two numbers that this operation combines; it is empty for an input or a
-    constant. The field `constant` is 0 for the constant zero, 1 for the constant one, and None for every
-    other number.
+    Attributes:
+        constant: 0 or 1; None for any other number.
+        operands: Two operands; empty for an input or a constant.
     """
 
     constant: int | None = None
@@ -75,7 +75,7 @@ class Number:
 
 
 def count_shared(results: Any) -> int:
-    """Return the number of operations that compute the results. A shared operation counts once."""
+    """Count the operations; a shared operation counts once."""
     waiting, visited = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -90,7 +90,7 @@ def count_shared(results: Any) -> int:
 
 @dataclass
 class _RecordedRecursion:
-    """The functions of the forward recursion, called with `Number` so that operations can be counted."""
+    """The forward recursion, called with `Number`."""
 
     written: list[Any] = field(default_factory=list)
 
@@ -125,7 +125,7 @@ class _RecordedRecursion:
 
 
 def count_operations(plan: CompiledTree, quantity: str) -> int:
-    """Count operations for one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
+    """Count the operations for one frame in LOCAL_WORLD_ALIGNED."""
     columns = quantity == "jacobian"
     program, run = compile_program(plan, orientations=False, columns=columns), _RecordedRecursion()
     words: list[int] = program.words.tolist()

@@ -41,7 +41,7 @@ QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "accel
 
 
 class MismatchError(Exception):
-    """Two computations of one number return different results."""
+    """Two computations return different results."""
 
 
 def evaluate(case: Case) -> Outcome:
@@ -115,10 +115,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the name and the result of each checked computation.
-
-    Raise MismatchError if two computations of one number differ. Singular representations are skipped.
-    """
+    """Yield the name and result of each checked computation."""
     generator = np.random.default_rng(seed)
     inputs = _draw_inputs(robot, seed)
     frames = robot.all_frames
@@ -144,10 +141,7 @@ def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def compare_prepared(robot: Robot, seed: int) -> None:
-    """Compare unchecked results of a prepared frame with checked results of the robot's methods.
-
-    Raise MismatchError if two results differ.
-    """
+    """Compare a prepared frame with the robot's methods."""
     inputs = [x[0] for x in _draw_inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
@@ -192,10 +186,6 @@ def _compare_calls(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield results for several frames and configurations.
-
-    Raise MismatchError if a call for one frame or one configuration returns a different result.
-    """
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -221,7 +211,6 @@ def _compare_calls(
 def _placements_by_name(
     robot: Robot, q: FloatArray, generator: np.random.Generator
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name. urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     names = sorted(links | joints)
     prefixed_names = [f"{prefix}{name}" for name in names for prefix in ("", "link:", "joint:")]
@@ -237,10 +226,7 @@ def _placements_by_name(
 
 
 def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the placements that Denavit-Hartenberg tables give for the frames.
-
-    Each table describes the path from the root to a frame. Paths with a planar or floating joint are skipped.
-    """
+    """Yield the placements of Denavit-Hartenberg tables."""
     tree = robot.tree
     for frame in frames:
         if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):

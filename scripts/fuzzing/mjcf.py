@@ -153,10 +153,7 @@ def compile_model(data: bytes) -> mujoco.MjModel | None:
 
 
 def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Return a message about the first difference from MuJoCo, or None if there is no difference.
-
-    The placements of bodies and sites are compared, and the equality constraints are checked.
-    """
+    """Return a message about the first difference from MuJoCo."""
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = {

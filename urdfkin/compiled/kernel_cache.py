@@ -31,7 +31,6 @@ Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log a warning about the first compilation of this process."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -55,10 +54,9 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Inform the listener when the compilation of a kernel begins and ends.
+    """Report a compilation to the listener.
 
-    The context yields a function. The caller must call this function immediately before the compilation. If
-    the kernel is loaded from disk, the caller does not call the function, and the listener is not informed.
+    The caller must call the yielded function immediately before the compilation.
     """
     starts: list[float] = []
 
@@ -73,7 +71,7 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 
 @cache
 def kernel_cache_folder() -> Path | None:
-    """Return the cache folder of compiled kernels; None if no folder is writable."""
+    """Return None if no folder is writable."""
     with import_lock:
         from urdfkin.system.cache import make_cache_folder
 

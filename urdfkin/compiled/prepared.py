@@ -43,13 +43,13 @@ class _PreparedRobot(Protocol):
 
 
 class PreparedFrame:
-    """Fast computation of the quantities of one frame, such as the Jacobian, in one reference frame.
+    """Fast computation of one frame's quantities, such as the Jacobian.
 
     `Robot.prepare` creates the object. Results are exactly the same numbers as those of `Robot`. With
-    `verify=True`, urdfkin compares each result with Pinocchio's result and uses the tolerance of `Robot`.
-    With `verify=False`, results are not checked, and `Robot.certificate` reports them as unchecked.
-    Contiguous float64 arrays are used directly. For arguments of other types, `Robot` computes the result or
-    raises the error. Several threads may share one object, also on free-threaded Python.
+    `verify=True`, urdfkin compares each result with Pinocchio's result. With `verify=False`,
+    `Robot.certificate` reports the results as unchecked. Contiguous float64 arrays are used directly. For
+    other arguments, `Robot` computes the result or raises the error. Several threads may share one object,
+    also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -146,7 +146,9 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
-        """Return the Hessian (6, nv, nv), the derivative of the Jacobian with respect to each joint's motion.
+        """Return the Hessian (6, nv, nv).
+
+        The Hessian is the derivative of the Jacobian with respect to each joint's motion.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -176,10 +178,9 @@ class PreparedFrame:
         )
 
     def _compute_first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity, and return its first result.
+        """Create a fast function and compute the first result.
 
-        Return None if `Robot` must compute the result. For example, loading the fast function may take longer
-        than the computation.
+        None means that `Robot` must compute the result.
         """
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large

@@ -40,14 +40,14 @@ COSINE = (
 
 
 def _c_fma() -> Callable[[float, float, float], float]:
-    """Return the fused multiply-add of the C library that the Python process has loaded."""
+    """Return the C library's fused multiply-add."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
     return function
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add that gives inf or nan if `math.fma` raises an error."""
+    """Return a fused multiply-add that never raises."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -106,7 +106,7 @@ class Number:
 
 
 class Product:
-    """A product that is stored as its two factors."""
+    """A product, stored as two factors."""
 
     __slots__ = ("x", "y")
 
@@ -145,7 +145,7 @@ class Product:
 
 
 class ConstantNumber:
-    """The constant 0, the constant 1, or the placeholder `unused()` (`value` is None)."""
+    """The constant 0 or 1, or `unused()`."""
 
     __slots__ = ("value",)
 
@@ -178,10 +178,7 @@ class ConstantNumber:
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float.
-
-    The number must not be `unused()`.
-    """
+    """Convert a number to a float, except `unused()`."""
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)
@@ -199,12 +196,12 @@ def one() -> ConstantNumber:
 
 
 def unused() -> ConstantNumber:
-    """Return the placeholder for a number that no output needs."""
+    """Return the placeholder for an unneeded number."""
     return _UNUSED
 
 
 def round_product(x: Any) -> Any:
-    """Multiply the factors of a `Product` and round the result; return any other number unchanged."""
+    """Convert a `Product` to a rounded `Number`."""
     return Number(x.x * x.y) if type(x) is Product else x
 
 
@@ -236,7 +233,10 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`. The compiled `doubles_at` converts an address to a pointer."""
+    """Return the list `address`.
+
+    The compiled `doubles_at` converts an address to a pointer.
+    """
     return address
 
 
@@ -264,7 +264,7 @@ def is_in_range(total: Number) -> bool:
 
 
 def wait_for_writes(*_: object) -> None:
-    """Do nothing. The compiled `wait_for_writes` waits until all results are in memory."""
+    """Do nothing."""
 
 
 stream = wait_for_writes
@@ -274,7 +274,10 @@ stream = wait_for_writes
 
 
 def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
-    """Return (sine, cosine) of an angle; `urdfkin.compiled.machine.sine` explains the steps."""
+    """Return (sine, cosine) of an angle.
+
+    See `urdfkin.compiled.machine.sine` for the steps.
+    """
     x = angle.x
     if not abs(x) < LARGEST_ANGLE:
         return (Number(math.sin(x)), Number(math.cos(x))) if math.isfinite(x) else (Number(math.nan),) * 2
