@@ -33,7 +33,7 @@ class Change:
     field of a syntax node changes, `container` is the node, and `key` is the name of the field.
     """
 
-    node: ast.AST  # The description of the mutant quotes the text of this node.
+    node: ast.AST  # The mutant's description quotes this node.
     container: Any
     key: int | str
     value: Any
