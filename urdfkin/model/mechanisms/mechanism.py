@@ -840,7 +840,7 @@ class _VariablesBuilder:
                     restrict(k, line.variable, (low, high))
                 else:
                     mimic.add(line.variable)
-        # A joint of both models may move a joint of one model.
+        # A matched joint can mimic an unmatched joint.
         for k, unpaired in enumerate((self.alignment.only_a, self.alignment.only_b)):
             for joint in (self.trees[k].joints[j] for j in unpaired):
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
