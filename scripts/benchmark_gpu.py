@@ -46,10 +46,10 @@ from urdfkin.robot import Robot
 
 #: Batch sizes: the number of configurations in each batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
-#: Number of timed launches for each quantity, precision and batch size.
+#: Number of timed launches per measurement.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Largest allowed error of PyTorch Kinematics' Jacobian; this library reads angles in single precision.
+#: Tolerance for PyTorch Kinematics, which reads single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"

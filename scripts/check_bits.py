@@ -40,13 +40,13 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches. A kernel computes configurations in blocks of eight.
-#: The batches have less than one block, exactly one block, or one or several blocks and a remainder.
+#: Batches of less than one block, of exactly one, and of more with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: For each robot, the script stores results for at most STORED configurations and STORED_FRAMES frames.
+#: Maximum numbers of stored configurations and frames.
 STORED, STORED_FRAMES = 9, 6
-#: Index of the configuration that is computed in plain Python and by kernels.
+#: Configuration for plain Python and for kernels.
 INTERPRETED_INDEX = 3
 MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
@@ -166,7 +166,7 @@ def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # 0 and -0 have different bits, but their difference is 0.
+    # 0 and -0 differ in bits, but not in value.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

@@ -51,9 +51,9 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: A PyTorch or JAX file contains a Hessian only if the robot has at most this number of joint velocities.
+#: Maximum nv for a Hessian in a PyTorch or JAX file.
 #: The check of a larger Hessian is slow.
-#: An `array` file contains a Hessian for PyTorch, but not for JAX: JAX would compile the Hessian for minutes.
+#: JAX would compile the Hessian of an `array` file for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 

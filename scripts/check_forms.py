@@ -44,11 +44,11 @@ from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Octave's symbolic package takes 20 s for a table with six joints.
-#: Therefore, the package computes only 6 tables, and each of these tables has at most 4 rows.
+#: Octave's symbolic package takes 20 s for six joints.
+#: It therefore computes only 6 tables with at most 4 rows.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-#: First line of the program that Octave runs, for each format.
+#: First line of the Octave program, for each format.
 _FIRST = {
     "matlab-symbolic": "try, pkg load symbolic, catch, disp('missing'), exit(0), end",
     "matlab-rst": f"addpath('{Path(__file__).parent / 'forms' / 'octave'}');",
@@ -77,7 +77,7 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: Function that returns the poses of all jobs; it may write files into the folder.
+#: Function that returns the poses of all jobs.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -136,7 +136,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package also prints the version of Python that it found.
+    # Octave's package also prints the Python version.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -164,7 +164,7 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 RUN: dict[str, Run] = {
     **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": run_in_c,
-    # Octave uses substitutes for the toolbox's classes; `matlab-rst` has not been run in MATLAB.
+    # Substitutes replace the toolbox's classes; MATLAB was not run.
     **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
     **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
     "urdf": load_as_urdf,
@@ -218,7 +218,7 @@ class Case:
             Largest error against urdfkin, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Sine and cosine have rounding errors, so the bound is not zero even if all lengths are zero.
+        # Sine and cosine are rounded even if all lengths are zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

@@ -37,7 +37,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation matrix.
+#: Maximum rounding error of a placement element (m, or matrix entry).
 ROUNDING = 1e-10
 
 

@@ -22,7 +22,7 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: For each foreign library: the module or the packages that may import it.
+#: Modules or packages that may import each foreign library.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
@@ -85,7 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # An imported name is a module, or a name that is defined in a module.
+        # An imported name is a module or a name of a module.
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()

@@ -34,10 +34,10 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Largest error of a correct pose, in each coordinate (m) and each entry of the rotation matrix.
-#: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
+#: Largest error of a correct pose (m, or rotation matrix entry).
+#: Rounding causes less than 1e-14, a misread element more than 1e-3.
 TOLERANCE = 1e-9
-#: Time limit (s) of the process that tests the remaining features.
+#: Time limit of the process for the remaining features, s.
 _SECONDS = 60
 _MESSAGE_LENGTH = 160
 VERDICTS = {

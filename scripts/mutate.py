@@ -44,7 +44,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Files that Numba compiles. The script skips these files, because it changes the syntax tree of a module.
+#: The script changes Python modules, not files that Numba compiles.
 #: Numba reads the source text instead.
 #: tests/laws/test_mutation.py tests mutants of these files without Numba.
 COMPILED = {
@@ -102,11 +102,11 @@ def find_near_tests(path: Path) -> list[str]:
 class NamedMutant:
     claim: str  # the mistake that must be detected
     #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
-    #: If the code is outside functions, the full name of the module.
+    #: Outside functions, the module's full name.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`
-    test: str  # the test that fails with the mutant and passes without it
+    test: str  # the test that fails only with the mutant
 
     @property
     def file(self) -> Path:
@@ -144,7 +144,7 @@ class Mutant:
     file: str
     line: int
     change: str  # the text before and after
-    function: str  # the function that contains the mutant; line numbers change more often than this name
+    function: str  # the function with the mutant; line numbers change more often
 
 
 @dataclass(frozen=True)
@@ -186,13 +186,13 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        result = "not run"  # pytest reports an error, but not a failure of the named test.
+        result = "not run"  # pytest reports an error instead of a test failure.
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
     return Outcome(mutant, result, detail)
 
 
-#: The fork server imports the foreign libraries once, because this takes longer than most tests.
+#: The fork server imports foreign libraries once, to save time.
 _FORK_SERVER = multiprocessing.get_context("forkserver")
 _FORK_SERVER.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 

@@ -90,8 +90,8 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts. A short form applies to a verdict that begins with the key.
-#: If a verdict begins with several keys, the first key counts.
+#: Short forms of verdicts that begin with a key.
+#: The first matching key counts.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -99,7 +99,7 @@ _SHORT = {
     "not compared": "not readable",
 }
 _QUOTED = 120
-#: Settings with which MuJoCo accepts bodies without mass, or with an impossible inertia.
+#: MuJoCo then accepts bodies with no mass or impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 

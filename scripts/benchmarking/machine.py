@@ -21,11 +21,11 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Names of two times (ms): a process computes a quantity for the first time.
+#: Two times of a process's first result, ms.
 #: In one process, the kernel cache is empty. In the other process, the cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` whose first call compiles a kernel, each with the number of its inputs.
-#: Number of inputs 1: q; 2: q and v; 3: q, v and a.
+#: Methods of `Robot` that compile a kernel, with their inputs:
+#: 1: q; 2: q and v; 3: q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,

@@ -24,10 +24,10 @@ from urdfkin.compiled.plan import (
 )
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
-#: The reduction of the angle to r takes 10 operations.
-#: The computation of z = r^2, of 1 - z/2 and of their rounding errors takes 8 operations.
-#: The polynomials take 20 operations, and the last steps take 13.
+#: Operations for sine and cosine of one angle (`compiled.python_numbers`):
+#: 10 for the reduction of the angle to r,
+#: 8 for z = r^2, 1 - z/2 and their rounding errors,
+#: 20 for the polynomials, 13 for the last steps.
 _SINE_COSINE = 51
 
 
@@ -41,8 +41,8 @@ class Number:
     """
 
     constant: int | None = None
-    #: True for a number that has no effect on the results.
-    #: An operation is not counted if an operand has no effect on the results.
+    #: True for a number without effect on the results.
+    #: Operations with such an operand are not counted.
     unused: bool = False
     operands: tuple[Number, ...] = ()
 

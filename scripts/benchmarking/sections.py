@@ -154,14 +154,14 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# The computation of a batch has several steps, for example the forward recursion.
-# The benchmark measures a kernel for only the first step, a kernel for the first two steps, and so on.
-# The time of step k is the time of the kernel for k steps, minus the time of the kernel for k - 1 steps.
-# For one configuration, the benchmark measures seven lines of Python (`_calls`); most lines omit some steps.
-# For example, the forward recursion does not run in the line that passes a tuple instead of an array `out`.
-# The time of a step is computed from differences between the times of the lines.
+# A batch has several steps, for example the forward recursion.
+# The benchmark measures kernels for the first k steps.
+# Time of step k: time of k steps minus time of k - 1 steps.
+# For one configuration, the benchmark measures seven lines of Python (`_calls`).
+# For example, a tuple as `out` omits the forward recursion.
+# Time of a step: difference between two lines.
 
-#: The kernel's instructions for each step of a batch, in the order of the steps.
+#: Instructions for each step of a batch.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -259,9 +259,9 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # This line calls no function, so the measured time is the time of the loop.
+        "q",  # No function call: the time of the loop alone.
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
+        f"compute({q_v_a}, shape)",  # `compute` rejects a tuple as `out`.
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",

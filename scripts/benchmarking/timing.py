@@ -17,7 +17,7 @@ import numpy as np
 from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference (m, rad, m/s^2, rad/s^2) between contenders; it is much larger than rounding.
+#: Allowed difference between contenders, much larger than rounding.
 TOLERANCE = 1e-9
 
 
@@ -32,7 +32,7 @@ class TimedTask:
     label: str
     n: int
     compute: Callable[[], object]
-    #: Function that returns the results in urdfkin's conventions, for a comparison with another task.
+    #: Function that returns the results in urdfkin's conventions.
     #: None: the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
@@ -58,7 +58,7 @@ class Row:
     n: int = 0
     median_ns: float = 0.0
     minimum_ns: float = 0.0
-    #: Median time of the baseline, divided by the median time of the contender.
+    #: Median time of the baseline / median time of the contender.
     ratio: float | None = None
     remark: str = ""
 
@@ -139,22 +139,22 @@ class Calls:
     """
 
     label: str
-    #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
+    #: Variables of the lines, besides `q`, `v` and `a`.
     names: Mapping[str, Any]
-    #: Lines that compute one result. The last line is an expression; its value is the result.
+    #: Lines that compute one result, the value of the last line.
     lines: tuple[str, ...]
-    #: Lines that compute the result of configuration k, and write the result into `out[k]`.
-    #: None: the benchmark uses `lines`, and writes the value of the last line into `out[k]`.
+    #: Lines that write the result of configuration k into `out[k]`.
+    #: None: `lines` compute it.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: None: the library and urdfkin have the same order of coordinates.
+    #: None: urdfkin's order of coordinates.
     order: list[int] | None = None
-    #: Shape of the library's result for one configuration, as in `out[k]`.
-    #: None: the library's result has the same shape as urdfkin's result.
+    #: Shape of the library's result for one configuration.
+    #: None: the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    #: Converts the result of one call to an array with the layout of `out[k]`.
+    #: Converts a call's result to the layout of `out[k]`.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 

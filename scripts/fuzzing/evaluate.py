@@ -26,17 +26,17 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
+#: Findings about sizes beyond floating point; results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: The script compares a call for several frames with calls for single frames.
-#: At most this number of frames have a call for a single frame.
+#: Calls for several frames are compared with calls for single frames.
+#: Maximum number of single frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
-#: Distance of the far base from the world's origin, in metres.
+#: Distance of the far base from the origin, m.
 FAR = 1e6
-#: Quantities that one call can compute for several frames. A value is the number of inputs among q, v and a.
+#: Quantities of several frames, with their numbers of inputs.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -104,7 +104,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
     if verified:
         return Outcome("verified")
-    # Unchecked results are acceptable only if a finding states why they are unchecked.
+    # A finding must state why results are unchecked.
     for finding in findings:
         if finding.pinocchio_reading is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)
@@ -217,7 +217,7 @@ def _placements_by_name(
     for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
             yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
-        except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
+        except UnknownNameError:  # For example, `joint:x` is unknown without a joint x.
             if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.

@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Robots of the family "everything" have several random kinds of unusual content.
+#: "everything" combines several kinds of unusual content.
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
@@ -33,7 +33,7 @@ _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
 #: XML elements that other programs add to URDF files. A namespace prefix replaces `{p}`.
-#: A URDF reader must not read links, joints or mimic rules from these elements.
+#: Readers must ignore links, joints and mimic rules in these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -207,7 +207,7 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Most random robots are chains, because a chain accumulates the largest rounding errors.
+        # Chains accumulate the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
@@ -242,7 +242,7 @@ class _RandomRobot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # From URDF version 1.2 on, limits apply to all kinds of joints.
+        # From URDF 1.2 on, limits apply to all joints.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):
@@ -266,7 +266,7 @@ class _RandomRobot:
         rng = self.rng
         if "mimic" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # A mimic joint mimics only a joint with a lower number, so there is no cycle.
+        # A mimic joint mimics only joints with lower numbers.
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not independent_joints:
             return ""

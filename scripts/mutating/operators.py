@@ -35,7 +35,7 @@ class Change:
     | field of a node | the node | name of the field |
     """
 
-    node: ast.AST  # The description of the mutant quotes the text of this node.
+    node: ast.AST  # The mutant's description quotes this node.
     container: Any
     key: int | str
     value: Any

@@ -51,10 +51,10 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results of at least this many bytes do not fit into the caches and are written directly to memory.
+#: Larger results (bytes) are written directly to memory, past the caches.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
-#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
+#: 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_SIZE = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -161,7 +161,7 @@ def _compute(
 ) -> FloatArray:
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    # In an array with the stride 0, all rows are the same row of memory.
+    # With the stride 0, all rows are one row of memory.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (invalid := _compute_interpreted(name, program, reference, inputs, out, threads)) is None:
         invalid = _compute_compiled(
@@ -197,7 +197,7 @@ def _compute_interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.add_time(name, took)
-        # The first configuration takes longer than later configurations, so its time is not representative.
+        # The first configuration takes longer than the others.
         if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least) is not None:
             return None
     return invalid
@@ -285,14 +285,14 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Smaller batches use one thread, because starting a thread takes about ten microseconds.
+#: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
+#: Number of configurations per block, to fit into the cache.
 ROWS_PER_PART = 2048
 
-#: A function that computes the rows of the argument `out` from the rows of the argument `inputs`.
-#: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
+#: A function that computes rows of `out` from rows of `inputs`.
+#: It returns 1 for nan, inf or too large inputs, else 0.
 BlockFunction = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -346,7 +346,7 @@ def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | No
     if len(parts_by_thread) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, thread_parts) for thread_parts in parts_by_thread]
-    wait(work)  # An error is raised only after all threads have finished writing.
+    wait(work)  # All threads must finish writing first.
     for future in work:
         future.result()
     return None

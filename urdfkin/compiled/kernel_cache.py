@@ -18,14 +18,14 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
-#: Lock that a thread holds while it imports Numba or compiles a kernel.
-#: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
-#: Before a fork, Python acquires the locks in the reverse order of their creation.
-#: The import of Numba acquires this lock first and then `logging`'s lock.
-#: A fork must acquire both locks in the same order, so `logging`'s lock must be created before this lock.
+#: Lock for the import of Numba and for compilations.
+#: A fork waits for it, because a child cannot finish the parent's compilation.
+#: A fork acquires locks in the reverse order of their creation.
+#: The import of Numba acquires this lock before `logging`'s lock.
+#: `logging`'s lock must therefore be created before this lock.
 compile_lock = make_fork_safe_lock()
 
-#: A function with two arguments: a kernel's name, and the duration (s) of the kernel's compilation.
+#: A function of a kernel's name and its compile time, s.
 #: When the compilation begins, the second argument is None.
 Listener = Callable[[str, float | None], None]
 

@@ -24,8 +24,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: `_POSE_ROWS` lists the rows of scratch memory that contain the 16 elements of a pose.
-#: `_SIX_ROWS` lists the rows that contain the six numbers of a velocity or an acceleration.
+#: Scratch rows of the 16 elements of a pose.
+#: Scratch rows of the six numbers of a velocity or acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -74,7 +74,7 @@ def _store_pose_row(s, row, x, last):
 def write_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:
-        # The result is the velocity of the body point that is now at the world's origin.
+        # Velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
     _write_six_vector(m, s, program, place, b, vel, w, to)
 
@@ -210,7 +210,7 @@ def write_hessian(m, s, program, place, pairs, b, reference, state, to):
             store_vector(s, program[j + 3], _zero_vector())
             store_vector(s, program[j + 3] + 3, _zero_vector())
         for i in range(first, end, HESSIAN_COLUMN_WIDTH):
-            if program[i + 2] == rate:  # Mimic joints have the same velocity index as the mimicked joint.
+            if program[i + 2] == rate:  # Mimic joints have the velocity index of the mimicked joint.
                 _add_column_derivatives(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv

@@ -67,8 +67,8 @@ _MOTION = {
 }
 
 #: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
-#: The numbers 0, 1 and 2 of `axis` are the axes x, y and z of the joint's frame.
-#: `is_rotation` is True for a rotation about the axis, and False for a translation along the axis.
+#: `axis`: 0 for x, 1 for y, 2 for z of the joint's frame.
+#: `is_rotation`: True for a rotation, False for a translation.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -337,18 +337,17 @@ class ProgramHeader(IntEnum):
     BASE = 12
 
 
-#: Number of doubles in a row of scratch memory, one for each of eight configurations.
+#: Number of doubles in a scratch row, one per configuration.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers for an instruction: the operation, three operands, and the index of its constants.
+#: Integers per instruction: operation, three operands, index of its constants.
 INSTRUCTION_WIDTH = 5
-#: Number of integers that describe a joint angle in a program.
-#: The integers are the scratch rows of the angle and of its sine, the index of the mimic rule, and a flag.
-#: The flag is 1 if the mimic rule changes the angle.
+#: Integers per joint angle: scratch rows of the angle and of its sine,
+#: index of the mimic rule, and whether the rule changes the angle.
 ANGLE_WIDTH = 4
-#: Rows of scratch memory. Row 0 contains the number 0, and row 1 contains the number 1.
-#: Rows 2 to 17 contain the results of a frame, and row 18 contains a joint angle.
-#: All other numbers are in the rows from row 19 on.
+#: Scratch rows. Row 0: number 0. Row 1: number 1.
+#: Rows 2 to 17: results of a frame. Row 18: a joint angle.
+#: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Number of integers that describe one Jacobian column in a program that computes a Hessian.
@@ -586,9 +585,9 @@ def _block_starts(indices: Sequence[int]) -> list[int]:
 
 
 #: Number of bytes in a cache line.
-#: Access to a vector in two cache lines takes twice as long as access to a vector in one cache line.
+#: Access to a vector in two cache lines takes twice as long.
 _CACHE_LINE = 64
-#: The integer that represents each reference frame in a kernel.
+#: Number of each reference frame in a kernel.
 #: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
@@ -609,10 +608,10 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
+    #: Address of the base's state (24 numbers); 0 for a fixed base.
     BASE = auto()
-    #: Number of doubles from the beginning of one configuration to the beginning of the next configuration.
-    #: A stride is 0 if the array has only one row, which is used for all configurations.
+    #: Doubles from one configuration to the next;
+    #: 0 if one row is for all configurations.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -620,7 +619,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     OUTPUT_WIDTH = auto()
-    #: Address of the buffer that collects a block's results before they are written; 0 without a buffer.
+    #: Address of the buffer for a block's results; 0 without a buffer.
     BUFFER = auto()
 
     KERNEL = auto()

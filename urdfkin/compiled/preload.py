@@ -34,16 +34,16 @@ if TYPE_CHECKING:
 #: Thresholds (s) for the time in plain Python.
 #: The table in the module's docstring lists the action for each threshold.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
-#: Each further kernel is loaded when plain Python has taken this time (s).
+#: The first kernel is loaded after `LOAD_AFTER` of plain Python.
+#: Each further kernel is loaded after this time of plain Python, s.
 _LOAD_NEXT_AFTER = 0.03
-#: Time (s) that the fast function saves in each call with one configuration.
+#: Time that the fast function saves per call, s.
 _SECONDS_SAVED = 5e-5
-#: Time (s) after which the cache folder is searched again for a missing kernel.
+#: Interval between searches for a missing kernel, s.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two groups of kernels with about equal compile times; each of two processes compiles one group.
+#: Two groups of kernels with about equal compile times.
 _FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
 _SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -129,7 +129,7 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Python code for the second process: the process ends when its standard input closes.
+#: The second process ends when its standard input closes.
 #: The standard input closes when the first process ends.
 _EXIT_WITH_PARENT = (
     "import os, sys, threading;"
@@ -143,7 +143,7 @@ def _compile_in_background(name: str, module: str) -> bool:
     if kernel_cache_folder() is None:
         return False
     if not compile_lock.acquire(blocking=False):
-        return True  # Another thread compiles a kernel, or starts the second process.
+        return True  # Another thread compiles, or starts the second process.
     try:
         if any(process.poll() is None for process in _background.values()):
             return True

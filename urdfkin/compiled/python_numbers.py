@@ -11,15 +11,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
-#: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
-#: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
+#: No result overflows if all inputs are below this bound.
+#: N joints: joint velocity < LARGE^2, path length d < N LARGE^2,
+#: angular velocity w < N LARGE^2, largest product w^2 d < N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number between -2^51 and 2^51, the sum is rounded to an integer.
-#: The lowest bits of the sum's mantissa then contain the number, rounded to the nearest integer.
+#: Adding this constant rounds a number below 2^51 to an integer.
+#: The lowest bits of the sum's mantissa are this integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -225,7 +225,7 @@ def load_constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
+broadcast = Number  # The compiled `broadcast` copies a double to eight lanes.
 
 
 def array_data(array: Any) -> Any:

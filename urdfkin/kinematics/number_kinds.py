@@ -38,7 +38,7 @@ array_equations = bind_equations(
     product=np.matmul,
 )
 
-#: Length of a vector: an array with a number for each configuration, or a float for a single configuration.
+#: Length of a vector, for each configuration or for one.
 Length = Any
 
 
@@ -74,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: For each function in `equations`, a function that returns the scale of the equation's result.
-#: For a vector, such a function takes the vector's length; for a number, it takes the absolute value.
+#: Functions that return the scales of equations' results.
+#: Their arguments are lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,

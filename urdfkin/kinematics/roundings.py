@@ -199,7 +199,7 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: The unit `eps * scale` of an error is 0 or at least this number, which is the smallest subnormal number.
+#: Smallest nonzero value of `eps * scale`: the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
@@ -231,57 +231,56 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Two programs can compute different constant poses from the same file.
-#: This number is the allowed difference (in eps per joint).
-#: If all rounding errors have the same sign, the difference is 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
-#: The first and the third row of the first table in the docstring above contain these four errors.
-#: The standard deviation of the difference is 2.4 eps, so 13.7 is nearly six standard deviations.
+#: Allowed difference of constant poses from the same file,
+#: in eps per joint.
+#: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps,
+#: from the first and third row of the first table above.
+#: Standard deviation: 2.4 eps, so 13.7 is nearly six of them.
 CONSTANT_POSE_ROUNDINGS = 13.7
-#: Sum of the rounding errors (in eps) in the directions of two joint axes.
-#: For each axis, the division by the axis's length has an error of 0.5 eps.
-#: Rodrigues' formula adds an error of 2.0 eps for each axis.
+#: Rounding errors in the directions of two joint axes, in eps.
+#: Each axis: 0.5 from the division by its length,
+#: and 2.0 from Rodrigues' formula.
 AXIS_ROUNDINGS = 5.0
-#: Error (in eps) of the angle between consecutive joint axes, for each joint.
-#: The program that wrote a robot's file rounded the angles in this file.
-#: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
-#: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
-#: Roll and pitch both change the angle between a joint's z axis and the z axis of the joint before it.
+#: Error of the angle between consecutive axes, in eps per joint.
+#: Angles in a file are rounded.
+#: With fifteen digits (DBL_DIG), the error is half a unit of the last digit:
+#: 5e-15 rad, or 22.5 eps, for angles up to pi.
+#: Roll and pitch both change the angle between the axes.
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.
 FILE_ROUNDINGS = 45.0
 #: Rounding error of a length along a joint axis.
-#: The unit of the error is eps times the length of the path.
-#: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
-#: Only a few of these sums are nearly as large as the length of the path.
+#: Unit: eps times the length of the path.
+#: Dot product: 2.4 eps. Sum of lengths: 0.5 eps times the sum.
+#: Few of these sums are nearly as long as the path.
 LENGTH_ROUNDINGS = 4.0
 
-# Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
+# Numbers within these tolerances are replaced by round numbers.
 
-#: Rounding error (in eps rad) of an angle between -pi and pi.
-#: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
-#: A number in a file has an error of 1.0.
+#: Rounding error of an angle between -pi and pi, in eps rad.
+#: Computed multiple of pi/12: 1.2. Value of arctan2: 1.1.
+#: Number in a file: 1.0.
 ANGLE_ROUNDINGS = 4.0
-#: Error (in eps) of an entry of a rotation matrix.
+#: Error of a rotation matrix entry, in eps.
 #: The entry is a difference of two products. This difference causes an error of 0.75.
-#: In each of the two products, one factor is a difference of two other products.
+#: In both products, one factor is a difference of two products.
 #: This factor adds an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
-#: A length is rounded to twelve digits if the length changes by at most this number.
-#: The unit of the change is eps times the length of the path.
+#: Largest change when a length is rounded to twelve digits.
+#: Unit: eps times the length of the path.
 DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
-#: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
+#: First rotation, from roll, pitch and yaw: 3.1 eps.
 #: The second rotation is a product of three rotations.
 #: The product's error is the sum of four errors.
-#: The sines and the cosines have an error of 0.5 each.
-#: The two matrix multiplications have the errors 1.4 and 1.8.
+#: Sines and cosines: 0.5 each.
+#: Two matrix multiplications: 1.4 and 1.8.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed error (in eps) of a mimicked joint's limit that urdfkin computes from a mimic joint's limit.
-#: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
-#: Each of these four operations has an error of 0.5.
+#: Allowed error of a mimicked joint's computed limit, in eps.
+#: Subtraction, division, multiplication and addition: 0.5 each.
 #: The sum of the four errors is 2.0.
-#: `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the converted range are accepted.
+#: Twice this sum accepts both ends of the converted range.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 

@@ -65,10 +65,10 @@ from urdfkin.model.tree import FloatArray
 
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: First indices of position, velocities and accelerations in the state of a moving base.
+#: First indices in the state of a moving base.
 _BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
-#: Number of configurations in a block of the kernel `lengths`.
-#: The data of a block fit into the L1 cache.
+#: Number of configurations per block of the kernel `lengths`.
+#: A block fits into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -138,7 +138,7 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
     """Fill `out` with the compiled kernel; the results equal those of `_fill_without_kernel` bit for bit."""
     links = lengths.links
-    # The stride of an input is 0 if all configurations share one row.
+    # The stride is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -237,7 +237,7 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Each pair contains the joint's number of translations and the joint's number of rotations.
+#: Number of translations and number of rotations of each joint.
 _FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -533,12 +533,12 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Numbers of cross products that Pinocchio adds to compute the linear rows of a Hessian entry.
-#: A Hessian entry is the derivative of Jacobian column i with respect to the coordinate of joint j.
+#: Cross products in the linear rows of Pinocchio's Hessian.
+#: A Hessian entry is d(Jacobian column i) / d(coordinate of joint j).
 #: The joints on the path are numbered from the root.
-#: Each reference frame has two pairs of numbers: one pair for j <= i, and one pair for j > i.
-#: The first of the two numbers counts the products z x (z x d), which occur for two revolute joints.
-#: The second number counts the products z x z, which occur for a revolute and a prismatic joint.
+#: First pair: j <= i. Second pair: j > i.
+#: First number: products z x (z x d) of two revolute joints.
+#: Second number: products z x z of a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -671,7 +671,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        # The array is stored only when it is complete, because other threads may read the cache.
+        # Other threads may read the cache, so the array is complete.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 

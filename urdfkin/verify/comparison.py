@@ -108,7 +108,7 @@ def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray,
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If the number of rows in `size` is smaller than n, the kernel needs working memory.
+        # For fewer rows than n, the kernel needs working memory.
         if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)

@@ -55,10 +55,10 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 #: Number of random configurations besides the zero configuration.
 _SAMPLE_COUNT = 8
-#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
-#: The error of each program is less than 8 eps.
-#: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
-#: Quaternions need a square root, a quotient and products of two numbers.
+#: Rounding errors of urdfkin and Pinocchio in `check_orientations`, in eps.
+#: Each program has an error below 8 eps.
+#: Angles: arctan2, sines, cosines, products of three numbers.
+#: Quaternions: a square root, a quotient, products of two numbers.
 _ROUNDINGS = 16.0
 
 
@@ -132,8 +132,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the placements of the base and the tip relative to the root.
-    # The product of exponentials is the placement of the tip relative to the base.
+    # Pinocchio's placements of base and tip are relative to the root.
+    # The product of exponentials is relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (joint_roundings(joints) + size) + sum_zeroed_tilts(path)
@@ -211,7 +211,7 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _model_placements(model, _model_configurations(model, tree, q), made)
-    # The factor 2 in the bound allows for the rounded angles in the URDF text.
+    # The URDF text has rounded angles, hence the factor 2.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -264,9 +264,9 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The rotation matrices of the table's base and tool may be rounded to six digits.
+    # The table's base and tool may be rounded to six digits.
     # The URDF contains exact rotations.
-    # The bound therefore includes the deviation of the table's matrices from rotation matrices.
+    # The bound includes the deviation of these matrices from rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

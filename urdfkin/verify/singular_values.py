@@ -32,9 +32,9 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
+#: Relative rounding error of a few dozen sums and products.
 _RELATIVE_ERROR = 256.0 * EPS
-#: Maximum number of samples of a batch in the printed table.
+#: Maximum number of samples in the printed table.
 _MAX_ROWS = 10
 
 
@@ -235,7 +235,7 @@ def singular_values(
         skew = _orthogonality_error(U) + _orthogonality_error(Vt.swapaxes(-1, -2))
         lower = s * _round_down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _round_up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound of NaN becomes 0, and an upper bound of NaN becomes inf.
+    # NaN becomes 0 as a lower bound, and inf as an upper bound.
     lower, upper = (
         np.nan_to_num(_round_down(lower), nan=0.0),
         np.nan_to_num(_round_up(upper), nan=np.inf, posinf=np.inf),
@@ -253,7 +253,7 @@ def _orthogonality_error(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
+    # The norm of a matrix with inf is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

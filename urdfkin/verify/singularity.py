@@ -25,13 +25,13 @@ from urdfkin.errors.display import Displayable, TextDocument, format_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: The search finds minimal sets of at most `_MAX_SET_SIZE` linearly dependent columns.
+#: Largest size of a set of linearly dependent columns.
 _MAX_SET_SIZE = 4
-#: The search is skipped for a Jacobian with more than `_MAX_COLUMNS` columns.
+#: Larger Jacobians are not searched.
 _MAX_COLUMNS = 16
-#: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
+#: Rounding error of a singular value, per eps and (rows + columns).
 _ROUNDINGS = 16.0
-#: At random configurations, a singular value below this fraction of the norm counts as 0.
+#: Smaller fractions of the norm count as 0 at random configurations.
 _NEGLIGIBLE = 1e-9
 
 
@@ -149,8 +149,8 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, urdfkin cannot determine the lost directions of this configuration.
+        # With more rows than columns, the frame never moves in some directions.
+        # If they depend on q, the lost directions are unknown.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -274,11 +274,11 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        # Three linearly dependent lines that are parallel or concurrent lie in one plane.
+        # Three dependent lines that are parallel or concurrent are coplanar.
         # Four such lines need not lie in one plane.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
+        # Axes through a point a satisfy v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
@@ -337,7 +337,7 @@ def _sparse_basis(rows: FloatArray) -> FloatArray:
 
 def _orthonormal_basis(rows: FloatArray) -> FloatArray:
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    # Each singular value is 1 or 0, except for rounding.
+    # Each singular value is 1 or 0 up to rounding.
     return Vt[: int((s > 0.5).sum())]
 
 
