@@ -68,7 +68,8 @@ def compare(
 ) -> TableComparison:
     """Compare a table with a path.
 
-    Base and tip frames may differ by constant poses. `tolerance` is in metres. With `fit`, a fit comes first.
+    Base and tip frames may differ by constant poses. `tolerance` (m) applies at the tip. With `fit`, base,
+    tool, joint offsets and signs are fitted first.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -122,9 +123,9 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
-    """Return tip errors after a fast fit.
+    """Fit fast and return tip errors.
 
-    The fit stops at `target_error`, m. The results are metres and radians.
+    Units: m and rad. The fit stops at a tip error of `target_error` (m).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -168,7 +169,10 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Sample poses with independent mimic joints."""
+    """Return joint values and tip poses.
+
+    Mimic joints move independently.
+    """
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = sample_uniform(ranges, count, seed)
@@ -199,9 +203,9 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Find a standard cell's reference row.
+    """Find the reference row of a standard cell.
 
-    In a modified table, row i + 1 contains a, alpha and beta.
+    In a modified table, row i + 1 contains a, alpha and beta. None without such a row.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
@@ -222,7 +226,11 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_hidden_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Find the cells whose errors a fit hides."""
+    """Find the cells whose errors a fit hides.
+
+    Returns:
+        Row index and name.
+    """
     hidden = []
     for i, k in find_hidden_cells(fitted, check_targets):
         reference_index = _reference_row_index(reference, i, CELLS[k])
@@ -303,8 +311,8 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
     """Bound the tip error for all joint values.
 
-    The bounds are in metres and radians. The bounds exclude rounding errors. Mimic rules are ignored.
-    Prismatic joints without a range stay within `ASSUMED_LIMIT`.
+    Units: m and rad. The bounds exclude rounding errors. Mimic rules are ignored. Prismatic joints without a
+    range stay within `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -315,7 +323,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path without mimic rules.
+    """Convert a path, ignoring mimic rules.
 
     Links have the table's names.
     """

@@ -78,6 +78,7 @@ class TableArrays:
     Attributes:
         cells: (n, 5) theta, d, a, alpha, beta.
         turns: 1 for a revolute joint.
+        senses: Signs of the joints.
     """
 
     cells: FloatArray
@@ -105,7 +106,10 @@ class TableArrays:
 
     @cached_property
     def T_last_tip(self) -> FloatArray:
-        """Pose of the tip, with later joints at zero."""
+        """Pose of the tip in the last revolute joint's frame.
+
+        The later joints are at zero.
+        """
         turning = np.flatnonzero(self.turns)
         begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
@@ -120,7 +124,10 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path and (s, 5 n) motions."""
+        """Return the path and motions (s, 5 n).
+
+        Motions are in rad or m. `values` are (s, n) joint values.
+        """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
             amounts[:, len(CELLS) * i + k] += self.senses[i] * values[:, i]
@@ -145,7 +152,7 @@ class TargetPoses:
     scale: float
 
     def largest_errors(self, model: TableArrays) -> tuple[float, float]:
-        """Return largest errors, m and rad."""
+        """Return largest errors (m, rad)."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
@@ -162,9 +169,9 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Differentiate the tip's poses.
+    """Return the tip's poses with derivatives.
 
-    Angles are multiplied by the scale.
+    The derivatives are twists. Angles are multiplied by the scale.
 
     | Result | Shape |
     |---|---|
@@ -187,9 +194,9 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists (6 s, 6).
+    """Return tip twists (6 s, 6).
 
-    The frame moves along or about each axis.
+    The frame moves along or about its own axes.
     """
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
@@ -220,7 +227,7 @@ def apply_changes(
 
 
 def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """Apply a small twist to T."""
+    """Apply a twist in T's frame."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
@@ -259,7 +266,7 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of few cells.
+    """Remove tip errors by few changes.
 
     A cell that acts like a free parameter is not changed.
     """
@@ -285,7 +292,11 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
 
 
 def find_hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Find cells equivalent to free parameters."""
+    """Find cells equivalent to free parameters.
+
+    Returns:
+        Row and cell index.
+    """
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)
@@ -306,7 +317,7 @@ def fit_model(
 ) -> TableArrays:
     """Fit the free parameters.
 
-    The fit stops at `target_error`, m.
+    The fit stops at a tip error of `target_error` (m).
     """
     written = TableArrays.of(standard)
 
@@ -347,7 +358,7 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 
 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
-    """Yield start values for the fit."""
+    """Yield the table, then likely signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)

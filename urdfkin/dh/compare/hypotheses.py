@@ -198,7 +198,7 @@ class Interpretation:
     """Convention, units and columns of a table.
 
     Attributes:
-        columns: Contents of a, alpha, d, theta.
+        columns: True contents of the columns.
     """
 
     convention: DHConvention | None

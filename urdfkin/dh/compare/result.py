@@ -40,7 +40,7 @@ class CellDifference:
 
     Attributes:
         tip_displacement: Largest tip displacement due to this cell, m.
-        half_digit: Half of the last digit's unit.
+        half_digit: Half a unit of the last digit of `reference`.
             Exact or unknown values have 0.
     """
 
@@ -133,9 +133,10 @@ class TableComparison:
 
     Attributes:
         reference: Fitted table, with the URDF's joint coordinates.
-        travel: Sum of the largest prismatic values, m.
-        senses: Signs in `sign * q + offset`.
-        metres, radians: Largest tip errors.
+        travel: Sum of the prismatic joints' largest absolute values, m.
+        senses: Signs of the joints.
+            The table's variable is sign * q + offset.
+        metres, radians: Largest tip errors on samples.
         metres_bound, radians_bound: Proven bounds, without rounding errors.
             Joints stay within their limits.
             A prismatic joint without limits stays within 10 m of zero.
@@ -186,7 +187,7 @@ class TableComparison:
     def rounding(self) -> float:
         """Largest tip error due to rounding.
 
-        Unit: rad, or m/m of reach.
+        Unit: rad, or m per m of reach.
         """
         return EPS * fit_roundings(len(self.reference.rows))
 
@@ -207,13 +208,13 @@ class TableComparison:
     def exact(self) -> bool:
         """Whether table and URDF provably differ only by rounding.
 
-        Joint values as in `metres_bound`.
+        The proof covers the joint values of `metres_bound`.
         """
         return self.metres_bound <= self.rounding_metres and self.radians_bound <= self.rounding
 
     @property
     def condition(self) -> str:
-        """Assumption about joints without limits."""
+        """Assumption about prismatic joints without limits."""
         rows = self.reference.rows
         free = [row.joint for row in rows if not row.kind.turns and not has_range(row.limit)]
         return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
@@ -233,9 +234,9 @@ def has_range(limit: Limit | None) -> bool:
 
 
 def fit_resolution(relative_error: float, radians: float) -> float:
-    """Return the fitted numbers' rounding step.
+    """Return the power of ten for rounding fitted numbers.
 
-    `relative_error` is in m/m of reach.
+    `relative_error` is in m per m of reach.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(relative_error, radians, _MIN_TIP_ERROR))))
 

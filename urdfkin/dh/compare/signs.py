@@ -53,9 +53,9 @@ class SignFit:
     Attributes:
         senses: Signs of the joints.
             A sign -1 reverses the reference's variable.
-        offsets: Offsets of theta or d.
-        base: (4, 4) `T_base_0`.
-        tool: (4, 4) `T_n_tip`.
+        offsets: Joint offsets, rad or m.
+        base: (4, 4) pose T_base_0.
+        tool: (4, 4) pose T_n_tip.
     """
 
     senses: tuple[int, ...]
@@ -73,8 +73,8 @@ class _PartialAlignment:
         offsets: Joint offsets without the last.
         phi_in: Rotation about z to the URDF frame, rad.
         delta_in: Offset along z to the URDF frame, m.
-        free_offset: Row index, and rotation direction of x.
-            None without a free offset.
+        free_offset: Row of a free joint offset, and x's direction.
+            The direction is +1 or -1.
     """
 
     cost: float
@@ -89,10 +89,9 @@ class _PartialAlignment:
 def find_sign_fits(
     chain: FrameChain, reference: DHTable, count: int = MAX_PATTERNS, beam_width: int = BEAM_WIDTH
 ) -> list[SignFit]:
-    """Align a path with a table.
+    """Return the best alignments with a standard table.
 
-    The table must be standard. Path and table must have equal joint kinds. Prismatic joints may allow equal
-    results.
+    Path and table must have equal joint kinds. With prismatic joints, several results may be equal.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -130,7 +129,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return A_k for the joint signs.
+    """Return A_k for two joint signs.
 
     A sign -1 turns a joint frame by pi about x.
     """
@@ -142,7 +141,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Extend an alignment by one joint."""
+    """Extend an alignment by each transform."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)

@@ -1,8 +1,7 @@
 """Export a table as code for exact symbolic computation, and format names and numbers in code.
 
-`urdfkin.export` writes code that computes with doubles. This module writes exact numbers: pi/2 stays pi/2,
-and 0.425 becomes 17/40. The Python code uses SymPy. The MATLAB code uses the Symbolic Math Toolbox, or
-Octave's package symbolic.
+Numbers are exact: pi/2 stays pi/2, and 0.425 becomes 17/40. The Python code uses SymPy. The MATLAB code uses
+the Symbolic Math Toolbox, or Octave's package symbolic.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def header_lines(table: DHTable) -> list[str]:
 
 
 def sanitize(text: str) -> str:
-    """Replace unsafe characters by underscores."""
+    """Replace characters that could end a comment or string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
@@ -70,7 +69,7 @@ def check_no_mimic(table: DHTable, what: str) -> None:
 
 
 def format_limits(row: DHRow) -> str:
-    """Return both limits, or ""."""
+    """Return both limits. Without limits: ""."""
     return format_numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
@@ -85,7 +84,7 @@ _MAX_DENOMINATOR = 10**9
 
 
 class Fractions(Units):
-    """Format exact numbers for SymPy."""
+    """Format angles as multiples of pi, lengths as fractions."""
 
     def format_length(self, metres: float) -> str:
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
@@ -151,7 +150,7 @@ def placement(q):
 
 
 def write_sympy(table: DHTable) -> str:
-    """Return a module with `placement(q)`."""
+    """Return a SymPy module with `placement(q)`."""
     number, n = Fractions(), len(table.joint_names)
     base, tool = (
         "[" + ", ".join(f"[{', '.join(map(number.format_length, row))}]" for row in T.tolist()) + "]"
@@ -193,7 +192,7 @@ class _Matlab(Fractions):
 
 
 def write_matlab_symbolic(table: DHTable) -> str:
-    """Return the function file `ROBOT_symbolic`."""
+    """Return a MATLAB file with `ROBOT_symbolic`."""
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {make_identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header_lines(table)]

@@ -98,7 +98,7 @@ _CSV_COLUMNS = (
 
 
 def write_csv(table: DHTable) -> str:
-    """Return comments, column names and rows."""
+    """Return CSV: comments, column names, rows."""
     data = to_mapping(table)
     rows = data.pop("rows")
     data.pop("snap", None)

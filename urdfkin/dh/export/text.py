@@ -47,7 +47,7 @@ def format_variable(
     name: str = "q{}",
     number: Callable[[float], str] = "{:.10g}".format,
 ) -> str:
-    """Return text such as -q2."""
+    """Format a variable, such as -q2."""
     mimicked_joint = row.mimic.mimicked_joint if row.mimic else row.joint
     q = name.format(table.joint_names.index(mimicked_joint) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
@@ -57,7 +57,7 @@ def format_variable(
 def format_coordinate_names(table: DHTable) -> str:
     """Return text such as "with q1 = left".
 
-    Empty if names match the rows.
+    Empty if joint i belongs to row i.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
@@ -253,7 +253,7 @@ class PrintedPrecision:
 
     Attributes:
         metres: Largest error on the samples.
-        bound: Bound within joint limits, m.
+        bound: Proven bound within the limits.
         unlimited: Whether `ASSUMED_LIMIT` replaces missing limits.
     """
 
@@ -310,9 +310,9 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
-    """Return the largest mimicked joint value.
+    """Return the mimicked joint's largest absolute value.
 
-    The value is 0 without a mimic rule.
+    Without a mimic rule: 0.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
