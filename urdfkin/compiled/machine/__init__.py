@@ -1,8 +1,8 @@
 """The modules that need Numba: number types, kernels, and the cache of kernels.
 
 Numba reads settings from a file `.numba_config.yaml` in the current folder. The file can select a cache
-folder, and Numba executes the files in the cache. This package makes Numba read only environment variables.
-Numba still reads the file if a program imports Numba before this package.
+folder, and Numba executes the files in the cache. This package makes Numba read only environment variables,
+unless a program imports Numba first.
 """
 
 from __future__ import annotations

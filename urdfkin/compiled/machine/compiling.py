@@ -240,7 +240,7 @@ class Kernel:
 
 
 class CKernel(Kernel):
-    """A compiled function for C code.
+    """A compiled function that C code can call.
 
     All arguments are integers. Calls release the global interpreter lock.
     """

@@ -132,7 +132,7 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose square blocks of a matrix.
+    """Transpose each square block.
 
     The number of rows must be a power of two.
     """
@@ -153,7 +153,7 @@ def _add_constant(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Return a reader of `width` numbers."""
+    """Make a reader of `width` numbers."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -174,7 +174,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a writer of `width` numbers."""
+    """Make a writer of `width` numbers."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -335,7 +335,7 @@ def is_in_range(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy eight numbers to memory, bypassing the caches.
+    """Copy eight numbers, bypassing the caches.
 
     `to[at]` must begin a cache line.
     """
@@ -352,7 +352,7 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy numbers to memory, bypassing the caches.
+    """Copy numbers, bypassing the caches.
 
     Writes of whole cache lines need no read. `address` is the address of `to[0]`.
     """

@@ -54,7 +54,7 @@ class Product(types.Type):
 
 
 class ConstantNumber(types.Type):
-    """A compile-time constant; None for `unused()`."""
+    """A compile-time constant: 0, 1, or None for `unused()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -86,7 +86,7 @@ class _ConstantNumberModel(models.OpaqueModel):
 
 
 class _Value:
-    """A number with Numba type and LLVM value."""
+    """A typed value in LLVM code."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
@@ -215,7 +215,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return an LLVM vector.
+    """Return a number as an LLVM vector.
 
     `unused()` is not allowed.
     """

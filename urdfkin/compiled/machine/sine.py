@@ -51,7 +51,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _small_sine_cosine(context: Any, x: Any) -> Any:
-    """Return the sines and cosines of small angles."""
+    """Return sines and cosines below `LARGEST_ANGLE`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments

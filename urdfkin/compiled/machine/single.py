@@ -1,12 +1,11 @@
 """Make compiled functions that compute a quantity for one configuration.
 
 Python calls a compiled function like a built-in function: CPython passes the arguments' addresses without a
-check. In a call through Numba, checking the arguments would take as long as the recursion itself. The
-compiled function reads a few 8-byte words of each array object, at the offsets that CPython and NumPy
-guarantee to C code. The function holds Python's global interpreter lock for about a microsecond.
+check. Checking the arguments in Numba would take as long as the recursion itself. The compiled function reads
+8-byte words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function
+holds Python's global interpreter lock for about a microsecond.
 
-A flag protects the scratch memory. One atomic operation sets the flag, so the flag is safe even in a Python
-without a global interpreter lock.
+An atomic flag protects the scratch memory, even in a Python without a global interpreter lock.
 
 | Situation | Result |
 |---|---|
@@ -116,7 +115,7 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of an array's doubles.
+    """Return the address of the doubles.
 
     The address is 0 for unsupported arrays. The first axis has the length `rows`, each other axis `columns`.
     """
@@ -165,7 +164,7 @@ def one_configuration(bound, arguments, count):
 
 @inline
 def _compute_into(address, inputs, to, ndarray):
-    """Compute into the array `to`.
+    """Write the result to `to`.
 
     Returns:
         Whether the result is valid.
@@ -206,7 +205,7 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Make a builtin from machine code.
+    """Make a function from machine code.
 
     The function keeps `bound` alive.
     """
@@ -267,7 +266,10 @@ def make_single_evaluator(
 def wrap_c_function(
     c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Wrap a C function for Python."""
+    """Make a function that calls C.
+
+    The array contains the C arguments.
+    """
     address = ctypes.cast(c_function, ctypes.c_void_p).value
     return _make_evaluator(address or 0, orders, shape, plan, c_function)
 
