@@ -30,12 +30,12 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return exact code for the language sympy-exact."""
+    """Return exact code for sympy-exact, otherwise `code`."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
-    """Return the exported file's text.
+    """Return an exported file's sealed text.
 
     `file` is the name in comments.
     """

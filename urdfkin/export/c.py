@@ -51,7 +51,7 @@ def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
 
 
 def fill_template(name: str, /, **texts: str | int) -> str:
-    """Replace each placeholder `@name@`."""
+    """Fill a template's placeholders, `@name@`."""
     template = (_TEMPLATES / name).read_text(encoding="utf-8")
     return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 

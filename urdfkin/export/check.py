@@ -167,7 +167,7 @@ def _find_program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Return the lines "good" and "WRONG"."""
+    """Return lines that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,

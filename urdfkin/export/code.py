@@ -110,7 +110,7 @@ def make_verified_code(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Make functions and test vectors.
+    """Make functions and their test vectors.
 
     Pinocchio checks the functions unless verification is off.
     """

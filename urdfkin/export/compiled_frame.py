@@ -55,7 +55,7 @@ class NoCompilerError(Exception):
 
 
 def load_library(code: FrameCode) -> ctypes.CDLL:
-    """Compile one function as a library.
+    """Compile one function, and load the library.
 
     The library's function `task` takes an array with the fields of `KernelArgs`. `task` returns 1 if an
     input is not finite.

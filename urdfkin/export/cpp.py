@@ -22,7 +22,7 @@ from urdfkin.export.function import Function
 
 
 def write(code: FrameCode, to: str = "cpp") -> str:
-    """Return a header.
+    """Return the text of a header.
 
     The macro `NAME_MAIN` adds a program that runs the test vectors.
     """

@@ -78,7 +78,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Replace a multiple of pi/12 by a `PiMultiple`."""
+        """Replace multiples of pi/12 by `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
@@ -124,7 +124,7 @@ def make_exact_plan(
 def _aligning(axis: Vector, z: float) -> Matrix:
     """Return a rotation matrix with third column `axis`.
 
-    See `rotation_with_z_axis` for the formula. `axis` is a unit vector, and `z` a float.
+    See `rotation_with_z_axis`. `axis` is a unit vector. `z` is the third component as a float.
     """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
@@ -171,7 +171,7 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks with exact constants.
+    """The checks of an exact file.
 
     Attributes:
         angle_count: Number of different replaced angles.

@@ -43,6 +43,7 @@ class Node:
         index: Number in the order of creation.
             Operands have smaller numbers.
         step: Index of the recursion's step.
+            The joints come first, then the frame and the results.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -98,7 +99,10 @@ class Graph:
         return self.make_node(letter, index)
 
     def make_node(self, op: str, *operands: Any) -> Node:
-        """Equal operations share a node."""
+        """Return the node of an operation.
+
+        Equal operations share a node.
+        """
         key = (op, *operands)
         if (node := self._nodes.get(key)) is None:
             node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
@@ -145,7 +149,7 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Store the equation's number in new nodes.
+        """Make an equation store its number in new nodes.
 
         Nested equations store the outer equation's number.
         """
@@ -172,7 +176,10 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return -x for a negation or negative constant x."""
+    """Return -x for a negation or negative constant x.
+
+    Otherwise return None.
+    """
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None

@@ -54,7 +54,7 @@ def make_chain_code(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return code for a chain.
+    """Return code for the last frame.
 
     The chain's base is the world frame.
     """
@@ -83,7 +83,7 @@ def make_chain_code(
 
 
 def _replace_unsafe_names(table: DHTable) -> DHTable:
-    """Replace names that URDF forbids."""
+    """Replace names that a URDF does not allow."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -138,7 +138,7 @@ class Function:
         return value
 
     def evaluate(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """Compute the results (n, ...).
+        """Evaluate the results (n, ...).
 
         `inputs` are q (n, nq), v and a (n, nv).
         """
@@ -180,7 +180,7 @@ def _strip_minus(node: Node) -> Node:
 def make_function(
     plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
 ) -> Function:
-    """Make the function of a frame.
+    """Make the function of one frame.
 
     If `plan` contains expressions, `graph` must contain the same expressions.
     """
@@ -204,7 +204,7 @@ def make_function(
 
 
 def _name_nodes(step: int, state: LinkState) -> None:
-    """Give names such as `w2_z`."""
+    """Name nodes, for example `w2_z`."""
     named = {f"R{step + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)
@@ -264,7 +264,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return rounding errors, in eps."""
+    """Return rounding errors (n,) in eps."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
@@ -282,6 +282,9 @@ def _constant_error(x: float) -> float:
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add underflow errors. Overflow gives inf."""
+    """Add errors of numbers that underflow.
+
+    Overflow gives inf.
+    """
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

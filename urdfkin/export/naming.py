@@ -17,7 +17,7 @@ _MAX_COMMENT_LENGTH = 80
 
 
 def safe_name(name: str) -> str:
-    """Return a name without special characters.
+    """Return letters, digits and single underscores.
 
     >>> safe_name("panda_joint1"), safe_name("*/ int x; //"), safe_name("%")
     ('panda_joint1', 'int_x', 'x')

@@ -69,7 +69,7 @@ class ExportVector:
 
 @dataclass(frozen=True)
 class Proof:
-    """The checks of an exported file.
+    """Test vectors and comparison with Pinocchio.
 
     Attributes:
         single_precision_bounds: Largest bounds, in eps * scale.
@@ -217,7 +217,10 @@ def _make_vectors(
 def _find_tolerances(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (n, numbers) bounds in eps, and scales."""
+    """Return error bounds and scales.
+
+    Both shapes are (n, numbers). The bounds are in eps.
+    """
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)

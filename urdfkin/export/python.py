@@ -29,7 +29,7 @@ class Dialect:
         imports: Import lines. `{}` stands for functions such as `cos`.
         values: Body of the exported function `_values`.
         index: Pattern of an input's number, such as `q[0]`.
-        check_parameter: Parameter of the exported `check`, or empty.
+        check_parameter: Parameter of the exported `check`.
     """
 
     about: str
@@ -52,7 +52,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Make code that fills an array."""
+    """Make a `result` that fills arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -65,7 +65,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Make code that returns a matrix.
+    """Make a `result` that returns matrices.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -102,7 +102,7 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
 def _zero(writer: Writer, xp: str) -> str:
     """Make code that creates zeros.
 
-    The zeros have the inputs' batch shape.
+    The zeros have the inputs' batch shape, type and device.
     """
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
@@ -116,7 +116,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Make code that checks input lengths."""
+    """Make `Dialect.first_lines` that check lengths."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -134,7 +134,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make code that stacks all numbers.
+    """Make a `result` that stacks numbers.
 
     Arrays may be immutable, as in JAX.
     """
@@ -185,7 +185,8 @@ def _make_check(
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong` and `is_array` are Python expressions. An empty `is_array` accepts every container.
+    `wrong` and `is_array` are Python expressions. An empty `is_array` accepts every container. `given`
+    contains further parameters.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
