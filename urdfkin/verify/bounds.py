@@ -684,9 +684,11 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
     Rounding can change the sign of a smaller |qw|.
 
-        delta: error of R, as in `quaternion_jacobian_bound`
-        limit: 1.5 k eps = 3 delta
-        error of qw <= 2.3 delta < 3 delta
+    | | |
+    |---|---|
+    | error of R, as in `quaternion_jacobian_bound` | delta |
+    | limit, 1.5 k eps | 3 delta |
+    | error of qw | at most 2.3 delta, below the limit |
     """
     return 1.5 * EPS * result_k(bound, leading)
 
