@@ -134,7 +134,6 @@ class CompiledTree:
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether a number of the tree reaches `LARGE`."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
@@ -350,11 +349,9 @@ ANGLE_WIDTH = 4
 #: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers that describe one Jacobian column in a program that computes a Hessian.
-#: The first integer is the first scratch row of the column.
-#: The second integer is the row in `steps` of the joint to which the column belongs.
-#: The third integer is this joint's index in v.
-#: The fourth integer is the first scratch row of a sum of derivatives with respect to this joint's motion.
+#: Integers per Jacobian column in a program for a Hessian:
+#: first scratch row of the column, the joint's row in `steps`, the joint's index in v,
+#: and first scratch row of the sum of derivatives with respect to the joint.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {

@@ -63,8 +63,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Dynamic globals are memory addresses of this process.
-        # Such code cannot be cached.
+        # Code with memory addresses of this process cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 

@@ -301,8 +301,7 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add to `total` the squares of `count` numbers that begin at `x[at]`.
 
-    If `count` is not a multiple of eight, each remaining number is added to all eight partial sums. Adding a
-    number eight times is harmless, because the total is compared only with a very large bound.
+    The last numbers may be added eight times. The total is compared only with a very large bound.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
