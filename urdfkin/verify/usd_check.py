@@ -179,8 +179,8 @@ class SinglePrecisionErrors:
 
     Attributes:
         links: (links, 2) position error (m), angle error (rad), in all configurations.
-        joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule. The
-            first two errors are errors of the child link in the parent link, at q = 0.
+        joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
+            Columns 0 and 1 describe the child link in the parent link, at q = 0.
     """
 
     links: FloatArray

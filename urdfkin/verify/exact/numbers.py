@@ -350,7 +350,7 @@ class _ValueBound(NamedTuple):
     Attributes:
         scaled_coordinate: |M q|.
         offset: Sum of |c| over the terms c of C.
-        error: Rounding error, eps, of a program that applies the rules one after the other.
+        error: Rounding error, eps. A program applies the rules one after the other.
     """
 
     scaled_coordinate: Any
