@@ -364,6 +364,7 @@ def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
+    """Return the rotation matrix of a rotation vector."""
     vector = as_vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
