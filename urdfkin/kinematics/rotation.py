@@ -103,7 +103,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
     M = U (I + E):  result = U (I - 3/2 E^2)
     |E| <= 3e-9
-    error <= 3/2 |E|^2 <= 1.4e-17 = (eps/2) / 8,  eps/2 = 1.1e-16
+    error <= 3/2 |E|^2 <= 1.4e-17, an eighth of eps/2 = 1.1e-16
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -557,9 +557,10 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return Omega^-1 in closed form (7.56).
 
-    F:              rotation about the first axis
+    F:              rotation by the first angle
+    w' = F^T w:     w in the frame after F
     r_1, r_2, r_3:  rates of the three angles
-    w' = F^T w = r_1 first + r_2 second + r_3 (along first + across other)
+    w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)
     r_3 = w'_other / across
     r_2 = w'_second
     r_1 = w'_first - along r_3

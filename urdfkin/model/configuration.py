@@ -663,7 +663,7 @@ _SAMPLERS = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_float
 
 
 def special_configurations(tree: KinematicTree) -> FloatArray:
-    """Return the zero, lower and upper configurations."""
+    """Return the zero, lower-limit and upper-limit configurations."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = joint_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):

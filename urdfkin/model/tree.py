@@ -135,7 +135,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 class Mimic:
     """The rule of a mimic joint.
 
-    Its value is multiplier * q_mimicked + offset.
+    The joint has the value multiplier * q_mimicked + offset.
     """
 
     mimicked_joint: str
@@ -250,7 +250,7 @@ class KinematicTree:
     Attributes:
         links: The link `links[i + 1]` is the child of `joints[i]`.
         joints: Joints in Pinocchio's order.
-        poses: Named poses of some joints.
+        poses: Named poses, each for some joints.
     """
 
     name: str
@@ -361,7 +361,7 @@ class KinematicTree:
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
-        """Unique names, root first."""
+        """Unique frame names, root first."""
         names = [self.links[0]]
         for joint, child in zip(self.joints, self.links[1:], strict=True):
             names += [joint.name, child]
