@@ -40,10 +40,10 @@ from urdfkin.kinematics.roundings import (
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
+#: Below this tilt (rad), the common normal amplifies errors over 100 times.
 NEARLY_PARALLEL = 1e-2
 
-#: Axes with a larger tilt (rad) never get a Hayati row, even if their common normal is far away.
+#: Axes with a larger tilt (rad) never get a Hayati row.
 MAX_HAYATI_TILT = 0.35
 
 
@@ -299,9 +299,9 @@ def _choose_offset(
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # One of the rows i to end - 1 may be a Hayati row.
-        # Then d is chosen so that the Hayati row and the reference table have the same cell a.
+        # A later prismatic joint or the tool compensates for d.
+        # Rows i to end - 1 may contain a Hayati row.
+        # d then gives the Hayati row the reference table's a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -356,7 +356,7 @@ def match_theta(theta: float, reference: float) -> float:
     )
 
 
-#: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
+#: Longest permitted length, m; squares of longer lengths may overflow.
 MAX_LENGTH = 1e150
 
 

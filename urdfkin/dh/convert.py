@@ -52,7 +52,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
 
 
 #: URDF requires limits for prismatic joints.
-#: A prismatic joint without limits therefore gets these limits (m, m/s and N).
+#: Limits of a prismatic joint without limits (m, m/s and N).
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 

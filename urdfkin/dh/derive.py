@@ -41,7 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
+#: Tolerance of a right angle, rad; 1.571 is a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {
@@ -225,10 +225,10 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # The projection of the base's x axis e onto the plane normal to z is x = e - (e . z) z.
-    # The expression below equals x, and has no cancellation if z is close to e.
+    # Projection of the base's x axis e onto the plane normal to z: x = e - (e . z) z.
+    # The expression below has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
+    # If z_0 is nearly the base's x axis, x_0 is the projected y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
@@ -256,8 +256,8 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", each row contains the offset of its own link here.
-    # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
+    # For parallel_offset="first", each row has its own link's offset.
+    # `_sum_offsets_in_first_row` then moves the sum to the first parallel axis.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):

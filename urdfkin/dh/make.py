@@ -22,14 +22,14 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: If the cells of two tables differ by more than this number, the tables describe different robots.
+#: Larger cell differences mean different robots.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
-#: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
+#: Tolerance of equal angles theta (rad) and rotation matrix entries.
 _ZERO_TOLERANCE = 1e-2
-#: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
+#: Tolerance of equal cells (rad, or relative to the reach).
 _ROUNDING = 1e-12
-#: These options follow from the published table if the argument `like` is given.
+#: Options that the published table of `like` determines.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
@@ -51,8 +51,8 @@ def find_reversed_joints(
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
-    # The base can compensate for a reversed first joint, and the tool for a reversed last joint.
-    # Therefore, both signs of the first joint and both signs of the last joint are tried.
+    # Base and tool compensate for reversed first and last joints.
+    # Both signs of both joints are therefore tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -78,7 +78,7 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
         theta = abs(angle_difference(row.theta, other.theta))
-        # The tool compensates for differences of a and alpha in the last row.
+        # The tool compensates for a and alpha in the last row.
         if i < n - 1:
             is_unique = row.kind.turns and table.rows[i + 1].kind.turns
             unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)
@@ -156,7 +156,7 @@ def make_dh_table(
         RangeError: the square of a length is outside the range of doubles.
     """
     exact = make_chain(tree, tip, base)
-    # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
+    # Pinocchio's poses are relative to the root.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]

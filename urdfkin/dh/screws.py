@@ -43,9 +43,9 @@ from urdfkin.model.tree import (
 )
 
 #: Tolerance of handwritten screws and of M.
-#: The length of an axis vector may differ from 1 by this number.
-#: The pitch (m/rad) of a screw may differ from 0 by this number.
-#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
+#: Tolerance of the length of an axis vector.
+#: Tolerance of the pitch of a screw, m/rad.
+#: Tolerance of the entries of R R^T - I, R the rotation in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 

@@ -37,12 +37,12 @@ from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
-#: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: Above 7.5 degrees, two multiples of 15 degrees would be possible.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
-#: Assumed range (rad or metres) of a mimicked joint that is not on the path.
+#: Assumed range of mimicked joints outside the path, rad or metres.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: `find_noisy_cells` returns cells with a deviation up to this number (rad, or relative to the table's span).
+#: Largest deviation in `find_noisy_cells` (rad, or relative to the span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -88,7 +88,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A prismatic axis may have been shifted to the origin of the previous joint.
+            # A prismatic axis may have been shifted to the previous origin.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_make_change(exact, pivot, what, angle), row=i))
@@ -153,7 +153,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # In gimbal lock, only the sum or difference of roll and yaw is defined, so roll is set to 0.
+    # Gimbal lock determines only roll + yaw or roll - yaw, so roll is 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:

@@ -152,10 +152,10 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: An angle in a table is treated as a rounded multiple of 15 degrees up to this deviation.
+#: Largest deviation of a rounded multiple of 15 degrees.
 #: The deviation is a fraction of 15 degrees.
 _ROUND_TOLERANCE = 1e-3
-#: Tolerance of handwritten rotation matrices, because they often have only seven digits.
+#: Tolerance of handwritten rotation matrices, often with seven digits.
 _RIGID_TOLERANCE = 1e-6
 
 

@@ -208,8 +208,8 @@ class _LinkAxis:
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
     links = list[_LinkAxis]()
-    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
-    # A moving link has its own index i. For all other links, i is the index of the antecedent.
+    # For each link: (i, T_i_link, number of fixed joints from link i).
+    # i is the moving link's own index, or the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -234,7 +234,7 @@ def _find_transforms(
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
-        # The first moving child of a link defines the link's x axis.
+        # The first moving child defines the link's x axis.
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))
@@ -244,7 +244,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # For a link without a moving child, x is chosen so that theta is 0.
+    # Without a moving child, x makes theta 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)
@@ -316,7 +316,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule.
+    # The constant includes the offset of the mimic rule.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint

@@ -14,7 +14,7 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: Names of the vector operations from which all equations are composed.
+#: Vector operations of which all equations consist.
 VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 

@@ -185,9 +185,9 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 # -- planar and floating joints -----------------------------------------------------------------------
-# The joint's velocity is expressed in the axes of the link after the joint.
-# The vector b contains the time derivatives of the components of this velocity.
-# The axes of the link after the joint rotate with the angular velocity w + o.
+# The joint's velocity is in the axes of the link after the joint.
+# b: time derivatives of its components.
+# These axes rotate with the angular velocity w + o.
 
 
 def free_angular_acceleration(alpha, w, o, b):
@@ -227,8 +227,8 @@ def rate_in_turning_axes(rate, w, x):
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# Each derivative is multiplied by the velocity of its joint.
-# The sum of these products over all joints is the time derivative of the column (7.126).
+# Each derivative is multiplied by its joint's velocity.
+# The sum over all joints is the column's time derivative (7.126).
 
 
 def turned_along(w, linear, angular):

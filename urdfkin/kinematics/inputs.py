@@ -11,18 +11,18 @@ from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
-#: Largest accepted difference between 1 and the norm of a unit vector.
-#: If a vector is normalised in double precision, its norm differs from 1 by at most 4e-16.
-#: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
+#: Tolerance of a unit vector's norm.
+#: Normalising in double precision has an error of at most 4e-16.
+#: With six digits, Rodrigues' formula gives no rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
-#: If R is rounded to nine decimals, every entry of R has an error of at most 5e-10.
-#: An entry of R R^T is the dot product of two rows of R.
-#: The absolute values of the entries in a row of R sum to at most sqrt(3).
+#: Largest absolute entry of R R^T - I for a rotation matrix R.
+#: R with nine decimals: each entry has an error of at most 5e-10.
+#: Entry of R R^T: dot product of two rows of R.
+#: Sum of the absolute entries of a row: at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: The letters of NumPy's `dtype.kind` for complex numbers, bytes, text, timedelta, datetime and void.
-#: NumPy converts these kinds of data to floats without an error, although they are not real numbers.
+#: `dtype.kind` of complex numbers, bytes, text, timedelta, datetime and void.
+#: NumPy converts such data to floats without an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
@@ -36,7 +36,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # Without this check, NumPy converts text and None in an object array to numbers or NaN.
+        # NumPy would convert text and None to numbers or NaN.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)

@@ -92,7 +92,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
+#: Largest deviation of a matrix that is used unchanged.
 ROUNDED = 1e-15
 
 
@@ -189,7 +189,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     return total
 
 
-#: Largest accepted difference between 1 and the norm of a quaternion.
+#: Tolerance of a quaternion's norm.
 NORM_TOLERANCE = 1e-6
 
 
@@ -218,7 +218,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
     Shepperd's method avoids cancellation.
     """
     R = as_rotations(R, "R")
-    # Each row of the matrix K = 4 q q^T is a multiple of the quaternion q.
+    # Each row of K = 4 q q^T is a multiple of q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -335,7 +335,7 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """
     axis = as_unit_vectors(axis, "axis")
     angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
-    # For small angles phi, this formula of the versine 1 - cos(phi) has no cancellation.
+    # This formula of 1 - cos(phi) has no cancellation for small phi.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
     return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
@@ -383,7 +383,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of components below 1e-150 may lose digits. For such a vector, the result is 2 times `vector`.
+    # Squares of components below 1e-150 may lose digits; the result is then 2 `vector`.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -403,7 +403,7 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 _AXES = "xyz"
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Twelve Euler sequences with axes that turn with the body, and twelve with fixed axes.
+#: Twelve Euler sequences about moving axes, twelve about fixed axes.
 EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -494,7 +494,7 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     The third angle then follows from the first angle.
     """
     axes = find_sequence(name)
-    R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
+    R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.
     i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
     if axes.is_proper:
         first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
@@ -502,11 +502,11 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # Let R = F S T with the rotations F, S, T about the three axes. Then F^T R is equal to S T.
-    # Row `j` of S T is equal to row `j` of T, because S is a rotation about the axis `j`.
+    # R = F S T, rotations about the three axes; F^T R = S T.
+    # S turns about axis `j`, so row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # Only two entries of row `j` are not 0: the entries of the second axis and of the axis `rest`.
+    # Row `j` is nonzero only for the second axis and `rest`.
     rest, sense = (m, sign) if axes.is_proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.reorder(np.stack((first, second, third), axis=-1)).copy()
@@ -525,7 +525,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: At this distance (rad) or less from the singularity, Euler angle rates have too few correct digits.
+#: Closer to the singularity (rad), Euler rates have too few digits.
 NEAREST = 1e-9
 
 
@@ -570,8 +570,8 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axes = find_sequence(name)
     turns = axes.reorder(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # `along` is the component of the third rotation axis along the axis `first`.
-    # `across` is the component of the third rotation axis along the axis `other`.
+    # `along`: component of the third axis along the axis `first`.
+    # `across`: component of the third axis along the axis `other`.
     if axes.is_proper:
         along, across = cosine, -axes.sign * sine
     else:

@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: A comparison assumes that a robot has at least this size (m).
-#: Otherwise, the size of a robot would be 0 if all frames of the robot coincide.
+#: Smallest size of a robot in comparisons, m.
+#: A robot whose frames coincide would have the size 0.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -284,7 +284,7 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
+            # From child to parent, the constant pose follows the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

@@ -46,15 +46,15 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest absolute value (rad or m) of a random joint value.
-#: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
-#: A random value of a continuous joint is between -pi and pi.
-#: Some upper bounds hold only if the joints without limits travel at most this distance (m) from zero.
-#: Such joints are planar joints, floating joints, and prismatic joints without limits.
+#: Largest absolute value of a random joint value, rad or m.
+#: Revolute and prismatic joints without limits: -10 to 10.
+#: Continuous joints: -pi to pi.
+#: Some upper bounds assume this travel (m) of joints without limits:
+#: planar, floating, and prismatic joints.
 #: Few linear axes of robots are longer than 10 m.
-#: A bound for a travel of 10 m also holds for a shorter travel.
+#: Such a bound also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: Text of the condition under which such an upper bound holds.
+#: Text of the condition of such an upper bound.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
@@ -172,10 +172,10 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # The rounding error of the mimic joint's value narrows the range at each end.
+    # Rounding errors narrow the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
+    if not math.isfinite(error):  # With only one limit, the error is infinite.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -193,16 +193,16 @@ def _widen_limits(limit: Limit) -> tuple[float, float]:
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: Largest deviation (rad or m) of a mimic joint from its rule in `from_pinocchio`.
+#: Largest deviation from a mimic rule in `from_pinocchio`, rad or m.
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Suffix and unit of each coordinate of a planar or floating joint.
+#: Suffix and unit of a planar or floating joint's coordinates.
 _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-#: Suffix and unit of each joint velocity of a planar or floating joint; the time unit s is omitted.
+#: Suffix and unit, without 1/s, of a planar or floating joint's velocities.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
@@ -497,8 +497,8 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: To find angles in degrees, urdfkin checks at most this number of configurations of a batch.
-#: A few configurations are enough, because all configurations of a batch have the same unit.
+#: Number of configurations in the search for degrees.
+#: All configurations of a batch have the same unit.
 _MAX_CHECKED = 16
 
 
@@ -511,7 +511,7 @@ def degrees_messages(tree: KinematicTree, q: FloatArray) -> list[str]:
     elif q.ndim > 2:
         most = max(1, int(_MAX_CHECKED ** (1.0 / (q.ndim - 1))))
         q = q[tuple(slice(None, None, -(-size // most)) for size in q.shape[:-1])]
-    flat = q.ravel()  # For a short array, argmax is several times faster than max.
+    flat = q.ravel()  # For short arrays, argmax is faster than max.
     if not max(flat.item(flat.argmax()), -flat.item(flat.argmin())) > tree.min_implausible_angle:
         return []
     return [words for joint, words in _violations(tree, q) if not joint.mimic and "; degrees? " in words]
@@ -617,7 +617,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Random x, y and z coordinates of a planar or floating joint are between -2 and 2 m.
+#: Random positions of planar and floating joints: -2 to 2 m.
 _MAX_POSITION = 2.0
 
 

@@ -28,11 +28,11 @@ from urdfkin.errors.numbers import number_remedy, parse_float, parse_quantity
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, as_floats
 
-#: Types that q, v and a may have. `ArrayLike` contains `str`, so q, v and a may also be text.
+#: Types of q, v and a; `ArrayLike` includes text.
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
-#: Pattern of the blank between a number and its unit.
+#: The blank between a number and its unit.
 _BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _BLANKS_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 

@@ -57,7 +57,7 @@ class Coupling:
     def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
+        # The mimicked joint's unit is unknown here.
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
@@ -73,7 +73,7 @@ class Coupling:
     def values(self, q: ConfigurationLike) -> FloatArray:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
-        # Each row of G contains only one number that is not zero, so no matrix product is needed.
+        # Each row of G has one nonzero number, so no product is needed.
         return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 SixVector = tuple[Number, ...]
-#: The slice of q, v or a that begins with the joint's first number.
+#: Slice of q, v or a from the joint's first number.
 JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)

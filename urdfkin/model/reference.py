@@ -23,8 +23,8 @@ class Reference(IntEnum):
     True
     """
 
-    own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: True: the results describe the body point that is now at the world's origin.
+    own_axes: bool  #: Axes of the results: the frame's if True, else the world's.
+    #: True: results of the body point at the world's origin.
     #: False: the results describe the frame's origin.
     at_world: bool
 

@@ -70,10 +70,10 @@ class JointKind(Enum):
 
     nq: int
     nv: int
-    nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
-    has_axis: bool  #: Whether a joint of this kind rotates about an axis or translates along an axis.
+    nq_pinocchio: int  #: Number of coordinates in Pinocchio; free angles are (cos, sin).
+    has_axis: bool  #: Whether joints of this kind have an axis.
     turns: bool
-    has_limits: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
+    has_limits: bool  #: Whether joints of this kind have position limits.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
         member = object.__new__(cls)
@@ -108,12 +108,12 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
+#: Largest plausible joint angle; some wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value is far outside the limits if both of the following conditions hold.
-#: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
-#: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
-#: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
+#: A joint value is far outside a limit if the excess is above
+#: `_FAR_DISTANCE` (rad or m)
+#: and above `_FAR_FRACTION` times the joint's range.
+#: With only one limit, any excess is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
@@ -180,7 +180,7 @@ class Joint:
             )
 
     def __reduce__(self) -> tuple[type[Joint], tuple[Any, ...]]:
-        # Unpickling then calls the constructor, so that `__post_init__` makes the arrays read-only.
+        # Unpickling calls the constructor, which makes arrays read-only.
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
@@ -201,7 +201,7 @@ class Joint:
 
         The displacement of a locked prismatic joint is added.
         """
-        # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
+        # hypot avoids squares, which overflow for 1e200 and underflow for 1e-200.
         length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
             length += abs(self.lock.value)
@@ -230,7 +230,7 @@ class Lock:
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # A rotation about a coordinate axis has exact zeros and ones.
+        elif np.count_nonzero(axis) == 1:  # Rotations about coordinate axes have exact zeros and ones.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -506,7 +506,7 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
-    # With recursion instead of a stack, a chain of 50,000 links would exceed Python's recursion limit.
+    # Recursion would fail for a chain of 50,000 links.
     stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()

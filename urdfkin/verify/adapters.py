@@ -40,7 +40,7 @@ import numpy as np
 JointValue = Any
 Poses = dict[str, Any]
 _PLANAR, _FLOATING = 3, 7
-#: Suffixes of the three joints that replace a planar joint in MuJoCo.
+#: Suffixes of the joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 
 
@@ -197,7 +197,7 @@ def read_drake(text: str) -> LibraryModel:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    # A floating joint has the name of its child link in Drake.
+    # In Drake, a floating joint has its child link's name.
     joint_of_child = {child: joint for joint, child in _find_child_links(text).items()}
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
     joints = {joint_of_child.get(j.name(), j.name()): j for j in moving}
@@ -236,7 +236,7 @@ def read_idyntree(text: str) -> LibraryModel:
     }
     kin_dyn.setFloatingBase(root)
 
-    # The model is deleted together with its loader, so the argument `_loader` keeps the loader alive.
+    # The argument `_loader` keeps the loader and the model alive.
     def poses(values: Mapping[str, JointValue], _loader: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
         for name in q_slots.keys() & values.keys():
@@ -369,7 +369,7 @@ def read_newton(path: str) -> LibraryModel:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # If a body has no joint, Newton adds a free joint, which is not in the file.
+    # Newton adds a free joint to a body without a joint.
     q_slots = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, mimicked_joint, start, count in zip(
@@ -460,7 +460,7 @@ def main() -> None:
     """Read cases from standard input; print the results of the library named by the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    # Texts that the libraries print go to standard error, so that the output contains only results.
+    # Texts of libraries go to standard error, results to standard output.
     output = os.dup(1)
     os.dup2(2, 1)
     for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):

@@ -22,7 +22,7 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
-#: Array types that do not override methods of NumPy's arrays.
+#: Array types that override no method of NumPy's arrays.
 _PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 

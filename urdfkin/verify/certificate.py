@@ -319,5 +319,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # The counts are not copied, because the copy may be used in another process.
+        # The copy may be used in another process.
         return type(self), ()

@@ -32,13 +32,13 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
+#: Prefetch distance in rows.
 _PREFETCH_DISTANCE = 4
 
 
 @inline_function(fastmath={"reassoc"})
 def _is_finite(x, i):
-    # If a number is inf or NaN, the product of 0 and this number is NaN.
+    # 0 times inf or NaN is NaN.
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -173,7 +173,7 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
-#: Number of bounds (p, w, vel, alpha, acc) for each link.
+#: Number of bounds (p, w, vel, alpha, acc) per link.
 #: `free` contains five lengths for each planar or floating joint.
 _STATE_SIZE = _FREE_SIZE = 5
 

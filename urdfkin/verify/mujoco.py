@@ -44,20 +44,20 @@ from urdfkin.verify.oracle import (
 )
 from urdfkin.verify.pinocchio import tree_depth
 
-#: Placeholder for the mass (kg) and the moments of inertia (kg m^2) of each link.
+#: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
 #: Maximum number of links in a chain.
-#: MuJoCo's loading time grows with the square of the number of links.
-#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
+#: Loading time grows with the square of the number of links.
+#: MuJoCo rejects chains of more than 1,023 links after loading.
 _MAX_DEPTH = 1_000
-#: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
+#: MuJoCo's joints for a planar or floating joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
     "planar": ("slide x", "slide y", "hinge"),
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Maps a joint's kind to the numbers of coordinates and of joint velocities in urdfkin.
-#: All other kinds have one coordinate and one joint velocity.
+#: Numbers of coordinates and joint velocities of a joint's kind.
+#: Other kinds have one coordinate and one joint velocity.
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -160,7 +160,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
+        # MuJoCo requires these limits, but its kinematics ignores them.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
@@ -206,7 +206,7 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._compute_motion(x, 3)
         if not Reference.of(x.reference).at_world:
             return _change_reference(x.reference, poses, acceleration)
-        # A spatial acceleration can be shifted to the world origin; a classical acceleration cannot.
+        # Only a spatial acceleration can be shifted to the world origin.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, velocity = (
@@ -241,11 +241,11 @@ class MujocoOracle(Oracle):
         poses = self._compute_poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
+        if which.own_axes:  # In rotating axes, J-dot has the term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _change_reference(which, poses, rate, columns=True)
-        if which.at_world:  # The time derivative of p x J_angular contains vel x J_angular.
+        if which.at_world:  # The derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -333,7 +333,7 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
+            # Slide joints move in world axes, the ball joint in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]

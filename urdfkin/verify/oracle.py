@@ -98,7 +98,7 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
-#: `_COORDINATE_COUNTS` maps a joint's size in Pinocchio to the joint's number of coordinates in urdfkin.
+#: Number of coordinates in urdfkin, by a joint's size in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
@@ -159,7 +159,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: `_same_q` and `_same_v` are True if q and v are valid inputs of Pinocchio without conversion.
+        #: True if Pinocchio can use q and v without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -319,8 +319,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Because of rounding, the computed q has small components along the other eigenvectors of K.
-    # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
+    # Rounding adds small components along other eigenvectors of K.
+    # K + I = 4 q q^T, so multiplication by K + I removes them.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -353,10 +353,10 @@ def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 
 _MAX_NAMES = 5
 
-#: Maps a joint's number of joint velocities to the suffixes of the joint's coordinate names.
-#: A planar joint has three joint velocities, and a floating joint has six.
+#: Suffixes of coordinate names, by the number of joint velocities.
+#: A planar joint has three joint velocities, a floating joint six.
 _Q_SUFFIXES = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
-#: Maps a joint's number of joint velocities to the suffixes of the joint's velocity names.
+#: Suffixes of velocity names, by the number of joint velocities.
 _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 

@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import (
 )
 
 #: urdfkin requires these versions of Pinocchio.
-#: Tests confirm the definitions of accelerations and J-dot only for these versions.
+#: Versions for which tests confirm accelerations and J-dot.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -108,22 +108,22 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link; the recursive parser of Pinocchio 4.1.0 needs less than 4 kB for each link.
+#: Stack per link, bytes; Pinocchio 4.1.0 needs less than 4 kB.
 _STACK_BYTES_PER_LINK = 16_384
-#: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
+#: Shorter chains cause no stack overflow in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
+#: Maximum nv. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), here 2 GB.
 MAX_NV = 315
 
 #: Number of floating-point values in a block of results.
 #: A block of this size fits into the processor's cache.
 _BLOCK_SIZE = 16384
-#: Function of n that returns the results for the next n configurations.
+#: Function of n: results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 
 #: Prefix of link names while Pinocchio reduces a model.
-#: XML forbids the character U+0001 in names, so no joint of a URDF has a name with this prefix.
+#: XML forbids U+0001, so no URDF name has this prefix.
 _LINK_PREFIX = "\x01"
 
 
@@ -174,7 +174,7 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
+    # `buildReducedModel` confuses links and joints of the same name.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_PREFIX + frame.name
@@ -192,7 +192,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
+        # `urdfkin check` finds all known causes of this error.
         # The cause of this error is therefore unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
@@ -223,7 +223,7 @@ class PinocchioOracle(Oracle):
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects a link that has the same name as a joint or the free-flyer.
+        # `appendModel` rejects links with the name of a joint.
         # All joints and frames therefore get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
@@ -362,8 +362,8 @@ class PinocchioOracle(Oracle):
         """Return the columns (n, 6, columns) of Pinocchio's joint Jacobian, mimic joints included."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes the process for a Jacobian without columns.
-        # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
+        # Pinocchio 4.1 crashes for a Jacobian without columns.
+        # For one column, Pinocchio 4.1 returns a vector.
         for k, q_k in enumerate(self._convert_inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -408,7 +408,7 @@ def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[Float
         yield memory
         return
     step, rows_of_one = _block_length(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
-    # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
+    # For one column, Pinocchio 4.1 returns a vector.
     rows = memory.reshape(-1, *(size for size in memory.shape[3:] if size > 1))
     for first in range(0, n, step):
         start = first % memory.shape[0]

@@ -31,18 +31,18 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
-#: A sine and a cosine have an error of one eps each.
-#: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
+#: Bound on the difference of rotation matrix entries for equal angles.
+#: Sine and cosine have an error of one eps each.
+#: Two products and a sum, at most 1, add half an eps each.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference of a component of an axis that two programs normalise.
-#: The length has an error of 2 eps, and the quotient is rounded once.
+#: Bound on the difference of normalised axis components.
+#: The length has an error of 2 eps; the quotient adds one rounding.
 _AXIS_TOLERANCE = 5.0 * EPS
-#: yourdfpy's axis counts as normalised if the length of the axis differs from 1 by at most this number.
+#: Tolerance of the length of yourdfpy's axes.
 _UNIT_TOLERANCE = 1e-6
 _MAX_DIFFERENCES = 8
 _MAX_QUOTE_LENGTH = 200
-#: Kinds of joints that have position limits in the URDF specification.
+#: Joints with position limits in the URDF specification.
 _BOUNDED_KINDS = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -73,7 +73,7 @@ def compare_with_yourdfpy(
     joint and the first link of the tree. The URDF text does not contain this joint and this link.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    # A document type declaration can name other files, and yourdfpy would read these files.
+    # yourdfpy would read files that the document type names.
     if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type declaration")
     try:
@@ -111,7 +111,7 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
     """Read a URDF text with yourdfpy, without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
-    # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
+    # An XML declaration may name another encoding than UTF-8.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True

@@ -47,7 +47,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
+#: Largest length in a table with Hayati rows, in reaches (docs/dh.md).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -160,7 +160,7 @@ def _describe_loss(table: DHTable) -> str:
     )
 
 
-#: Linear and angular differences, by the name of the quantity.
+#: Linear and angular differences of each quantity.
 _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
@@ -171,9 +171,9 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Each quantity has one pair of numbers for linear differences, and one pair for angular differences.
-    #: The first number of a pair is the scale of rounding errors; the second is the effect of snapping.
-    #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
+    #: One pair for linear differences, one pair for angular differences.
+    #: First number: scale of rounding errors. Second number: effect of snapping.
+    #: bound = scale * relative rounding error + effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
@@ -285,8 +285,8 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     own = table_length(table)
     reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
-    # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
-    # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
+    # `Joint.tilt`: angle between the joint's axes in urdfkin and Pinocchio.
+    # A relative acceleration has up to four rotated vectors per term.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

@@ -41,13 +41,13 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: The joint frames of OpenUSD's parser and of urdfkin may differ by an angle (rad).
-#: The angle is at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
+#: Angle between the joint frames of OpenUSD and urdfkin, rad:
+#: at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`, see `_check_joint`.
 _ROTATION_ROUNDINGS = 18.0
-#: Number of rounding errors in a joint's origin; `_check_joint` derives this number.
+#: Rounding errors in a joint's origin, see `_check_joint`.
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
-#: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.
+#: Angle error of one operation, in `SINGLE_ROUNDOFF`, rad.
 #: `_compare_prims` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
@@ -165,7 +165,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Maps each joint's name to five numbers that bound the effect of rounding to single precision.
+#: Five bounds on single precision rounding for each joint.
 #: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
@@ -257,7 +257,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)[0]
-    # The root's pose in the stage is arbitrary, so all poses become relative to the root.
+    # The root's pose is arbitrary, so poses are relative to it.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
@@ -296,7 +296,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
-        # An error of one body displaces all later bodies, so only the first difference is reported.
+        # Only the first difference is reported, because later bodies move too.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

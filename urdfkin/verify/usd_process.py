@@ -67,7 +67,7 @@ def _read_joints_twice(read: Usd) -> dict[str, Any]:
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
             # A joint with PhysicsArticulationRootAPI has two descriptions in OpenUSD.
-            # One describes the joint, and the other describes an articulation and is skipped.
+            # One describes the joint, the other an articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
@@ -84,7 +84,7 @@ def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # `ends` is None if the joint has several free directions.
+        ends = own.get(free.lower())  # `ends` is None for a joint with several free directions.
     factor = np.pi / 180.0 if free.startswith("rot") else read.meters_per_unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table, besides the zero configuration and the limits.
+#: Number of random configurations in the check of a table.
 TABLE_SAMPLES = 40
 
 #: True: check all results of a call. "sample": check `SAMPLE` configurations of a call. False: check none.
@@ -53,7 +53,7 @@ Verify = bool | Literal["sample"]
 
 SAMPLE = 100
 
-#: Maximum number of values that are compared at once, so that the values fit into the processor's cache.
+#: Maximum number of compared values, to fit into the cache.
 _MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
 _MAX_CONFIGURATIONS = 4096
@@ -96,7 +96,7 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
+        # A copy builds its own Pinocchio and MuJoCo models.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -130,7 +130,7 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
+        # Pinocchio may accept a robot with fewer moving joints.
         known = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -424,7 +424,7 @@ def compute_own_results(quantity: Quantity, x: CallPart) -> FloatArray:
     return quantity.compute_results(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-#: Suppresses NumPy's warnings about inf and NaN, because the comparison reports these values.
+#: The comparison reports inf and NaN, so NumPy need not warn.
 _ignore_overflow = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 

@@ -31,18 +31,18 @@ from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
 #: Least number of decimal digits in the accuracy study.
-#: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
+#: 50 digits measure the rounding errors of doubles with 16 digits.
 DIGITS = 50
-#: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
+#: Decimal digits for a path without joints: twice a double's 15 digits.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
-#: Number of additional bits of an interval; for example, 15 digits have 50 + 5 bits.
-#: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
+#: Additional bits of an interval: 15 digits have 50 + 5 bits.
+#: With 53 bits, an interval could be four doubles wide.
 _ADDITIONAL_BITS = 5
-#: Number of significant digits of a written decimal; 17 digits determine every double.
+#: Significant digits of a written decimal; 17 digits determine a double.
 _SIGNIFICANT_DIGITS = 17
-#: Number of digits for the conversion of a midpoint to a decimal, before the decimal is rounded to 17 digits.
+#: Digits of a midpoint before the decimal is rounded to 17 digits.
 _CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _NEWTON_BITS = 30
@@ -79,7 +79,7 @@ def as_interval(value: Number) -> Number:
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
     # An integer is exact and needs no rounding.
-    # The results of a large robot are mostly the integer 0, so this shortcut saves time.
+    # This shortcut saves time: most results are the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -190,7 +190,7 @@ def _orthogonality_defect(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with the attribute `quat_xyzw`; older versions ignore the attribute.
+#: First URDF version with the attribute `quat_xyzw`.
 _FIRST_QUATERNION_VERSION = (1, 1)
 
 
@@ -230,7 +230,7 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
 
 
 # The cache avoids parsing the same URDF twice.
-# Parsing a large URDF is slower than computing the intervals of one sample.
+# Parsing a large URDF is slower than one sample.
 @lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:

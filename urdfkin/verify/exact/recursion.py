@@ -29,9 +29,9 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: Each velocity of a planar or floating joint is a velocity along or about an axis of the child link.
-#: The first entry of a pair is the index of this axis: 0 for x, 1 for y, 2 for z.
-#: The second entry of a pair is True for an angular velocity.
+#: Axis of each velocity of a planar or floating joint.
+#: First entry: axis of the child link, 0 for x, 1 for y, 2 for z.
+#: Second entry: True for an angular velocity.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -163,7 +163,7 @@ def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDAr
     """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # Each number is multiplied separately, because NumPy cannot multiply an interval by an array.
+        # NumPy cannot multiply an interval by an array.
         out[of, by] += _as_array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
