@@ -128,14 +128,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The terms of a point's velocity (7.124), m/s.
-
-    | term | formula |
-    |---|---|
-    | rotation | w x p |
-    | relative | R v_1 |
-    | origin | d-dot |
-    """
+    """The terms w x p, R v_1 and d-dot of a velocity (7.124), m/s."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -148,16 +141,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """The terms of a point's acceleration (7.125), m/s^2.
-
-    | term | formula |
-    |---|---|
-    | transverse | alpha x p |
-    | centripetal | w x (w x p) |
-    | coriolis | 2 w x R v_1 |
-    | relative | R a_1 |
-    | origin | d-dot-dot |
-    """
+    """The terms of a point's acceleration (7.125), m/s^2."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -177,10 +161,9 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return the terms of a point's velocity (7.124).
+    """Return the terms of a point's velocity (7.124; 7.59 if v_1 = 0).
 
     p-dot_0 = w x R p_1 + R v_1 + d-dot_01
-    v_1 = 0: equation 7.59
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
@@ -191,10 +174,9 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -
 def point_acceleration(
     frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
-    """Return the terms of a point's acceleration (7.125).
+    """Return the terms of a point's acceleration (7.125; 7.123 if fixed).
 
     p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot
-    v_1 = a_1 = 0: equation 7.123
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -213,13 +195,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's angular velocity (7.62, 7.63).
-
-    | joint | angular velocity |
-    |---|---|
-    | rotary | theta-dot z (7.62) |
-    | prismatic | 0 (7.63) |
-    """
+    """Return theta-dot z (7.62), or 0 for a prismatic joint (7.63)."""
     w: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
@@ -307,12 +283,9 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return C in [d-dot; w] = C x-dot (7.119, 7.120).
+    """Return C = diag(I, Omega) in [d-dot; w] = C x-dot (7.119, 7.120).
 
-    | representation | C |
-    |---|---|
-    | Euler angles | diag(I, Omega) |
-    | quaternion | diag(I, 4 E^T), with E of 7.57 |
+    For a quaternion, Omega is 4 E^T, with E of 7.57.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))

@@ -203,16 +203,9 @@ class FrameChain(Displayable):
         return self.path.frames(values)[..., ::2, :, :]
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return the pose of the tip in the base frame.
+        """Return the pose T_base_tip (..., 4, 4) for `q` (..., coordinates).
 
-        Args:
-            q: (..., coordinates), ordered as `joint_names`.
-
-        Returns:
-            (..., 4, 4) pose T_base_tip.
-
-        Raises:
-            InputError: `q` has the wrong length.
+        A wrong length of `q` raises InputError.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -222,13 +215,9 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
     def axes(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the unit axes z_{i-1} of the joints.
+        """Return the unit axes z_{i-1} (..., n, 3) in the base frame.
 
-        Args:
-            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
-
-        Returns:
-            (..., n, 3) unit vectors in the base frame.
+        Without `q`, the configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -238,13 +227,9 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the origins O_{i-1} of the joints, then the tip's origin.
+        """Return the joint origins (..., n + 1, 3) in the base frame, m.
 
-        Args:
-            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
-
-        Returns:
-            (..., n + 1, 3) points in the base frame, m.
+        The last origin is the tip's origin. Without `q`, the configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -254,13 +239,10 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
     def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the interorigin vectors d_{i-1,i}; the last leads to the tip.
+        """Return the interorigin vectors (..., n, 3) in the base frame, m.
 
-        Args:
-            q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
-
-        Returns:
-            (..., n, 3) vectors in the base frame, m.
+        The vector d_{i-1,i} leads from O_{i-1} to O_i. The last vector leads to the tip. Without `q`, the
+        configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

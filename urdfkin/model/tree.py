@@ -93,11 +93,9 @@ class JointKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """The limits of a joint.
+    """The limits of a joint, in rad or m.
 
     Attributes:
-        lower: Lower limit, rad or m.
-        upper: Upper limit, rad or m.
         velocity: Largest speed, rad/s or m/s.
         effort: Largest effort, N m or N.
     """
@@ -495,13 +493,7 @@ def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Sort the joints into Pinocchio's order.
-
-    Args:
-        name: The robot's name.
-        root: Name of the root link.
-        joints: Triples (joint, parent link, child link).
-    """
+    """Sort triples (joint, parent link, child link) into Pinocchio's order."""
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
