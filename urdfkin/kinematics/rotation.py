@@ -170,10 +170,10 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 
     Args:
         Rs: (..., n, 3, 3) orientations of frame i + 1 in frame i.
-        ws: (..., n, 3) velocities of frame i + 1, in frame i.
+        ws: (..., n, 3) angular velocities of frame i + 1 in frame i.
 
     Returns:
-        Velocity of frame n, in frame 0.
+        Angular velocity of frame n in frame 0.
     """
     Rs, ws = as_rotations(Rs, "Rs"), as_vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
