@@ -50,15 +50,15 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
-#: Time limit (s) of axe-core; a page of 100,000 elements takes half a minute.
+#: Time limit of axe-core, s; 100,000 elements take half a minute.
 _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Maximum number of presses of the Tab key on a page, and maximum number of PDF pages drawn as pictures.
+#: Maximum number of Tab presses per page, and of PDF pages.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: The site's theme hides some elements if Chromium reports no mouse.
+#: Without a mouse, the site's theme hides some elements.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -71,12 +71,12 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: JavaScript that returns name, width and available width of each table that is wider than its box.
+#: JavaScript: name, width and available width of too wide tables.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: JavaScript that describes the element with the focus, and whether an outline or shadow marks it.
+#: JavaScript: the focused element, and whether its focus is visible.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -86,7 +86,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript that returns whether the border of the focused element changes when it loses the focus.
+#: JavaScript: whether the border changes without focus.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -103,7 +103,7 @@ class Page:
     ready: str = ""
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
-    whole: bool = True  # False: only check the screens, not the keyboard, the HTML and the PDF
+    whole: bool = True  # False: check only screens, not keyboard, HTML and PDF
 
 
 def read_axe_script() -> str | None:
@@ -127,7 +127,6 @@ def report_makers(folder: Path) -> dict[str, Callable[[], str]]:
         return as_html(validate(robots, samples=samples).as_dict())
 
     def make_disagreement() -> str:
-        """Make a report with disagreements: Pinocchio's velocities are multiplied by 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
             return make_report(["panda", "ur5"], 6)
 
@@ -156,7 +155,6 @@ def make_same_report(b: str, within: float | None) -> str:
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:
-    """Yield the pages of a report of all robots."""
     document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
     texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}
@@ -219,7 +217,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def open_page(browser: Browser, page: Page) -> None:
-    # Chromium does not reload a page if the new address differs only in the part after `#`.
+    # Chromium does not reload for a change after `#`.
     browser.chrome.get("about:blank")
     browser.chrome.get(page.url)
     if page.ready:
@@ -255,7 +253,7 @@ def check_screen(
     ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws a 3D view only while the view is on the screen.
+            # The browser draws a 3D view only on the screen.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")
@@ -273,7 +271,7 @@ def check_keyboard(browser: Browser, page: Page) -> list[str]:
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
-        if stop is None:  # The Tab key moved the focus out of the page.
+        if stop is None:  # The Tab key left the page.
             break
         element, is_marked, has_area, has_name = stop
         seen.append(element)
@@ -345,7 +343,7 @@ def main() -> None:
         return name.startswith(tuple(arguments.only))
 
     def audit_page(browser: Browser, page: Page) -> None:
-        # The site stores the theme of the first visit, so the stored theme is removed before each page.
+        # The site stores the theme of the first visit.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         page_faults = audit(browser, page, arguments.output, axe, jar)

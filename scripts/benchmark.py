@@ -42,9 +42,9 @@ class BenchmarkSize:
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # A batch for the section `joints` has Jacobians with about this many elements.
-    frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
-    frame_configurations: int = 4_000  # number of configurations of a batch in the section `frames`
+    numbers: int = 4_000_000  # Jacobian elements of a batch in the section `joints`
+    frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames in one pass
+    frame_configurations: int = 4_000  # configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
     memory: int = 1_000_000  # number of configurations for the measurement of memory
 
@@ -55,7 +55,6 @@ QUICK = BenchmarkSize(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100,
 def measure_sections(
     size: BenchmarkSize, sections: Sequence[str], contenders: Sequence[Contender]
 ) -> dict[str, Any]:
-    """Measure everything; raise DifferenceError if two libraries have different results."""
     name, frame = ROBOT_FRAMES[0]
     n, rounds = size.configurations, size.rounds
     rows: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
@@ -117,7 +116,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # at exit, this library prints a hundred lines about memory leaks
+    if "roboticstoolbox" in sys.modules:  # the library prints warnings about memory leaks
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

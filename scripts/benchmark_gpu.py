@@ -46,10 +46,10 @@ from urdfkin.robot import Robot
 
 #: Batch sizes: the number of configurations in each batch.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
-#: Number of timed launches for each quantity, precision and batch size.
+#: Number of timed launches per measurement.
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Largest allowed error of PyTorch Kinematics' Jacobian; this library reads angles in single precision.
+#: Tolerance for PyTorch Kinematics, which reads single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"
@@ -137,7 +137,6 @@ def make_table(measured: Iterable[dict[str, Any]]) -> str:
 
 
 def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
-    """Yield a JSON line for each measurement with PyTorch; raise ValueError for a wrong result."""
     try:
         import torch
         from torch.utils.benchmark import Timer
@@ -167,10 +166,6 @@ def measure_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda
 
 
 def _pytorch_kinematics_jacobian(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
-    """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
-
-    Raise ValueError if the Jacobians of PyTorch Kinematics and urdfkin differ.
-    """
     import pytorch_kinematics
     import torch
 

@@ -34,7 +34,10 @@ def _run(*command: str | Path, **environment: str) -> None:
 
 
 def _commit_time() -> str:
-    """Return the time of the last commit (s), or 1980-01-01 outside a repository."""
+    """Return the time of the last commit (s).
+
+    Outside a repository, return 1980-01-01.
+    """
     command = ["git", "log", "-1", "--format=%ct"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "315532800"
@@ -84,7 +87,7 @@ def main() -> None:
     files = build(options.folder.resolve())
     check_reproducible(files)
     _run(sys.executable, "-m", "twine", "check", "--strict", *files)
-    # The wheel contains the licence of three.js twice: in the package, and in the folder of licences.
+    # The wheel contains the licence of three.js twice.
     # check-wheel-contents would report equal files with the code W002.
     _run(sys.executable, "-m", "check_wheel_contents", "--ignore", "W002", files[1])
     sbom = options.folder / f"urdfkin-{read_version()}.cdx.json"

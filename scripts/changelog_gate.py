@@ -20,7 +20,7 @@ _NO_CHANGELOG = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class NoBaseError(Exception):
-    """The branch cannot be compared with main; the message states the reason."""
+    """HEAD cannot be compared with main."""
 
 
 def run_git(root: Path, *words: str) -> str:
@@ -34,7 +34,6 @@ def run_git(root: Path, *words: str) -> str:
 
 
 def find_branch_point(root: Path) -> str:
-    """Return the commit at which HEAD left main."""
     head = run_git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
         try:
@@ -54,8 +53,8 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # git prints one entry for each changed file: added lines TAB deleted lines TAB path NUL.
-    # For a moved file, the entry is: added lines TAB deleted lines TAB NUL old path NUL new path NUL.
+    # Entry of a changed file: added TAB deleted TAB path NUL.
+    # Entry of a moved file: added TAB deleted TAB NUL old path NUL new path NUL.
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

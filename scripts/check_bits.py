@@ -40,13 +40,13 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches. A kernel computes configurations in blocks of eight.
-#: The batches have less than one block, exactly one block, or one or several blocks and a remainder.
+#: Batches of less than one block, of exactly one, and of more with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: For each robot, the script stores results for at most STORED configurations and STORED_FRAMES frames.
+#: Maximum numbers of stored configurations and frames.
 STORED, STORED_FRAMES = 9, 6
-#: Index of the configuration that is computed in plain Python and by kernels.
+#: Configuration for plain Python and for kernels.
 INTERPRETED_INDEX = 3
 MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
@@ -55,8 +55,6 @@ Arrays = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class RobotInputs:
-    """A robot, its inputs and its frames: the tip, and some frames of the whole tree."""
-
     name: str
     robot: Robot
     inputs: tuple[FloatArray, ...]
@@ -101,10 +99,7 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Compare the results of batches and of prepared evaluators with the results of single calls.
-
-    Yield a message for each difference.
-    """
+    """Yield a message for each difference."""
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]
@@ -165,13 +160,13 @@ def digest(now: Arrays) -> str:
 
 
 def difference_ratio(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference from the stored result as a fraction of the stored bound."""
+    """Return the difference as a fraction of the bound."""
     if have_equal_bits(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # 0 and -0 have different bits, but their difference is 0.
+    # 0 and -0 differ in bits, but not in value.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

@@ -51,9 +51,9 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: A PyTorch or JAX file contains a Hessian only if the robot has at most this number of joint velocities.
+#: Maximum nv for a Hessian in a PyTorch or JAX file.
 #: The check of a larger Hessian is slow.
-#: An `array` file contains a Hessian for PyTorch, but not for JAX: JAX would compile the Hessian for minutes.
+#: JAX would compile the Hessian of an `array` file for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 
@@ -63,9 +63,9 @@ def make_code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) 
 
 
 def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> Iterator[tuple[str, float]]:
-    """Run the exported code in each language. Yield each program's name and largest error ratio.
+    """Yield each program's name and largest error ratio.
 
-    An error ratio is the error of a result, divided by the bound on this error.
+    An error ratio is an error divided by the error's bound.
     """
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", code.name.upper()
@@ -92,12 +92,12 @@ def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> I
 
 
 def _largest_ratio(found: Sequence[float], count: int) -> float:
-    """Return the largest error ratio; NaN if a ratio is NaN, or if the number of ratios is not `count`."""
+    """Return NaN if a ratio is NaN or missing."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
 def leaf_frames(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield the tip frame of each robot, then other leaf links in a fixed random order."""
+    """Yield the tip frames, then the other leaves."""
     robots = {name: urdfkin.load(name) for name in example_robots()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
@@ -163,10 +163,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _write_files(library: str, folder: Path) -> Iterator[Path]:
-    """Write code for the tip frame of each robot, and yield the path of each file.
-
-    Each tip frame gets two files: one in the library's format, and one in the format `array`.
-    """
+    """Write two files for the tip of each robot."""
     for number, (_, robot, frame) in enumerate(leaf_frames(tips=True)):
         quantities = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)

@@ -44,11 +44,11 @@ from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
-#: Octave's symbolic package takes 20 s for a table with six joints.
-#: Therefore, the package computes only 6 tables, and each of these tables has at most 4 rows.
+#: Octave's symbolic package takes 20 s for six joints.
+#: It therefore computes only 6 tables with at most 4 rows.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-#: First line of the program that Octave runs, for each format.
+#: First line of the Octave program, for each format.
 _FIRST = {
     "matlab-symbolic": "try, pkg load symbolic, catch, disp('missing'), exit(0), end",
     "matlab-rst": f"addpath('{Path(__file__).parent / 'forms' / 'octave'}');",
@@ -61,7 +61,7 @@ _DOCUMENT = r"""\documentclass{article}
 
 
 class MissingProgramError(Exception):
-    """An interpreter or a library of a format is not installed."""
+    """An interpreter or a library is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: Function that returns the poses of all jobs; it may write files into the folder.
+#: Function that returns the poses of all jobs.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -136,7 +136,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package also prints the version of Python that it found.
+    # Octave's package also prints the Python version.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -164,7 +164,7 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 RUN: dict[str, Run] = {
     **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": run_in_c,
-    # Octave uses substitutes for the toolbox's classes; `matlab-rst` has not been run in MATLAB.
+    # Substitutes replace the toolbox's classes; MATLAB was not run.
     **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
     **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
     "urdf": load_as_urdf,
@@ -172,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return how much wider (points) each LaTeX table is than the text of an `article`; 0 if it fits."""
+    """Return each table's excess width (points)."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -196,9 +196,10 @@ def _find_program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A Denavit-Hartenberg table, some configurations, and the tip's poses that Pinocchio computes.
+    """A table with poses from Pinocchio.
 
-    The poses are relative to the base frame of the table.
+    Attributes:
+        pinocchio_poses: Tip poses relative to the table's base.
     """
 
     name: str
@@ -210,13 +211,14 @@ class Case:
         return self.job.table
 
     def measure_errors(self, found: FloatArray) -> tuple[float, float]:
-        """Return two errors of the poses `found`, which the exported code computes.
+        """Compare poses with Pinocchio and with urdfkin.
 
-        The first error is the largest difference (m) of a coordinate from Pinocchio's tip position. The
-        second error is the largest difference from urdfkin's poses, divided by the bound on rounding errors.
+        Returns:
+            Largest position error against Pinocchio (m).
+            Largest error against urdfkin, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Sine and cosine have rounding errors, so the bound is not zero even if all lengths are zero.
+        # Sine and cosine are rounded even if all lengths are zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )
@@ -240,7 +242,6 @@ def make_case(robot: Robot, name: str, table: DHTable) -> Case:
 
 
 def can_represent(form: str, table: DHTable) -> bool:
-    """Return whether a format can represent the table."""
     if form in LANGUAGES:
         return True
     try:

@@ -38,10 +38,7 @@ def _robot(inside: str) -> bytes:
 
 
 def _repeat(size: int, piece: str) -> str:
-    """Repeat a piece of XML until the text has about `size` bytes.
-
-    Each copy contains its number in place of `{i}`.
-    """
+    """Repeat a piece of XML, and number the copies."""
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
@@ -167,7 +164,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Check a document, and return the processor time and the growth of peak memory, per MB of the document.
+    """Return the processor time and the memory per MB.
 
     The memory includes the findings.
     """

@@ -37,12 +37,12 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of each element of a placement: a coordinate (m) or an entry of the rotation matrix.
+#: Maximum rounding error of a placement element (m, or matrix entry).
 ROUNDING = 1e-10
 
 
 def check_pair(name: str, change: str) -> dict[str, Any] | None:
-    """Check one change of one robot; return None if the change is impossible."""
+    """Return None if the change is impossible."""
     a, b = robot(name), changed(name, change)
     if b is None:
         return None

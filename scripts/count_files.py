@@ -24,7 +24,6 @@ A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
 
 
 def files_run(call: Callable[[], object]) -> list[str]:
-    """Return the files of urdfkin whose functions run during a call."""
     file_names: set[str] = set()
     importing = 0
 
@@ -50,7 +49,6 @@ def files_of_load(source: Path) -> list[str]:
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files whose functions run during `same`, if all kernels are already compiled."""
     same = partial(urdfkin.same, first, second)
     with use_only("compiled"):
         same()

@@ -20,8 +20,8 @@ from urdfkin.cli import cli
 LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Title, introduction and names of each page of the library.
-#: Names of the package `urdfkin` and of the class `Robot` are short; all other names have their full path.
+#: Title, introduction and names of each page.
+#: Only names in `urdfkin` and `Robot` are short.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -86,11 +86,11 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: Regular expression for GitHub's markup of an image with a light and a dark version.
+#: GitHub's markup of an image with light and dark versions.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )
-#: MathML of a sine or cosine whose argument is a symbol without brackets.
+#: MathML of a sine or cosine without brackets.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
@@ -143,7 +143,7 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """Name the search dialog for screen readers; the theme gives it no name."""
+    """Name the search dialog for screen readers."""
     dialog = 'data-md-component="search" role="dialog"'
     return output.replace(dialog, f'{dialog} aria-label="Search"')
 
@@ -192,7 +192,7 @@ def make_subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # The pages document each method of `Robot` in a section of its own, not in the section of the class.
+        # Each method of `Robot` has a section of its own.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {find_address(name)}\n    options:\n{lines}")

@@ -61,17 +61,14 @@ def make_case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one case after another. A case can crash the process."""
+    """A process that tests one case after another."""
 
     def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
         self.work, self.timeout = work, timeout
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a case, and return the result and details.
-
-        A crash or a timeout of the process is a result too.
-        """
+        """Test a case, which may crash the process."""
         if self.process is None:
             self.start()
         try:
@@ -104,10 +101,7 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Run the loop of a worker process: receive the family and number of a case, test it, send the outcome.
-
-    The loop has no end; the parent process kills the worker.
-    """
+    """Test cases until the parent kills the process."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

@@ -41,7 +41,6 @@ def use_robot(k: int, folder: Path) -> None:
 
 
 def measure_usage() -> dict[str, float]:
-    """Return the resident memory (MiB), the open descriptors and the number of objects."""
     gc.collect()
     here = psutil.Process()
     memory = here.memory_info().rss / 2**20
@@ -49,9 +48,9 @@ def measure_usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    # `use_only` makes urdfkin load each kernel at its first use.
-    # Otherwise, urdfkin would compute in Python at first, and load some kernels only after many calls.
-    # The memory of these kernels would look like a leak.
+    # `use_only` loads each kernel at its first use.
+    # Otherwise, some kernels would be loaded after many calls.
+    # Their memory would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), use_only("compiled"):
         warnings.simplefilter("ignore")
         found = []

@@ -22,14 +22,14 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: For each foreign library: the module or the packages that may import it.
+#: Modules or packages that may import each foreign library.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
 
 
 class Package(NamedTuple):
-    """A package of `urdfkin`, or a module of `urdfkin` that is in no package."""
+    """A package, or a module outside all packages."""
 
     name: str
     purpose: str
@@ -46,9 +46,7 @@ def modules() -> dict[str, Path]:
 
 
 def package_of(module: str) -> str:
-    """Return the package of a module; for a module outside `urdfkin`, return its folder.
-
-    The modules `urdfkin` and `urdfkin.__main__` count as the package `urdfkin`.
+    """Return the package of a module.
 
     >>> package_of("urdfkin.robot"), package_of("urdfkin"), package_of("scripts.mutating.operators")
     ('robot', 'urdfkin', 'scripts')
@@ -59,8 +57,6 @@ def package_of(module: str) -> str:
 
 def imported_names(text: str) -> Iterator[str]:
     """Yield the names that a module's text imports.
-
-    A module that is named in a string for a lazy import is yielded with the suffix `.*`.
 
     >>> list(imported_names("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
@@ -89,7 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # An imported name is a module, or a name that is defined in a module.
+        # An imported name is a module or a name of a module.
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()
@@ -100,10 +96,9 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that a package's `__init__` imports from other modules.
+    """Return the names that `__init__.py` imports.
 
-    A package may import an object that has the same name as one of its submodules. Then
-    `from package import name` returns the object, not the submodule.
+    Such a name can hide a submodule.
     """
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
@@ -114,7 +109,7 @@ def _reexported(package: str) -> frozenset[str]:
 
 
 def find_forbidden_imports() -> list[str]:
-    """List the forbidden imports: a package must not import a package that comes later in the order."""
+    """List imports that break the order of packages."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"
@@ -145,10 +140,7 @@ _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def draw_picture() -> str:
-    """Draw a row and a column for each package.
-
-    A dot shows that the package of the row imports the package of the column.
-    """
+    """Draw a dot for each import between packages."""
     index = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [

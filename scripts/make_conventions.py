@@ -48,7 +48,7 @@ def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str
 
 
 def _robot(*joints: str) -> str:
-    """Return a robot with links `base`, `l1`, `l2`, `l3`; MuJoCo does not merge the links."""
+    """Return a robot whose links MuJoCo does not merge."""
     links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
     compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
@@ -59,7 +59,7 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: A robot that shows the order of coordinates: joints z and a at the base, and joint k after z.
+#: Joints z and a at the base, and joint k after z.
 TREE = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -93,7 +93,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: Name of a library's package in the package index, if it differs from the library's name.
+#: Names in the package index that differ.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "rtb": "roboticstoolbox-python",
@@ -105,7 +105,6 @@ Readings = Mapping[str, FloatArray]
 
 
 def find_definition(found: FloatArray, readings: Readings) -> str:
-    """Return the only definition that matches a result."""
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
     ]
@@ -114,12 +113,12 @@ def find_definition(found: FloatArray, readings: Readings) -> str:
     return named[0]
 
 
-#: A row of the table: a convention, and the answers of urdfkin, Pinocchio and MuJoCo.
+#: A convention, and the answers of urdfkin, Pinocchio and MuJoCo.
 Row = tuple[str, str, str, str]
 
 
 class MeasuredMotion:
-    """One motion of one robot, computed by each library and by difference quotients."""
+    """A motion, computed by libraries and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
         rng = np.random.default_rng(seed)
@@ -141,11 +140,11 @@ class MeasuredMotion:
         self.body = self.mj_model.body("l3").id
 
     def path(self, t: float) -> FloatArray:
-        """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""
+        """Return T_world_frame at time t."""
         return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
 
     def motion(self) -> tuple[FloatArray, ...]:
-        """Return R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
+        """Return (R, p, velocity, w, acceleration, alpha), in world axes."""
         h = 1e-3
         T = {i: self.path(i * h) for i in (-2, -1, 0, 1, 2)}
         rate = (T[-2] - 8.0 * T[-1] + 8.0 * T[1] - T[2]) / (12.0 * h)
@@ -211,7 +210,7 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
             find_definition(theirs, readings),
             mujocos,
         )
-    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: rows `jacp`, then rows `jacr`
+    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: `jacp`, then `jacr`
     position = measured.mj_data.xpos[measured.body]
     mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], position, measured.body)
     yield (

@@ -34,10 +34,10 @@ PAGE, FIGURES, VERSIONS = (DOCS / f"libraries.{suffix}" for suffix in ("md", "js
 DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Largest error of a correct pose, in each coordinate (m) and each entry of the rotation matrix.
-#: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
+#: Largest error of a correct pose (m, or rotation matrix entry).
+#: Rounding causes less than 1e-14, a misread element more than 1e-3.
 TOLERANCE = 1e-9
-#: Time limit (s) of the process that tests the remaining features.
+#: Time limit of the process for the remaining features, s.
 _SECONDS = 60
 _MESSAGE_LENGTH = 160
 VERDICTS = {
@@ -115,11 +115,7 @@ def run_library(python: Path, library: str, cases: list[dict[str, Any]]) -> Iter
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Measure the given libraries, and return the page's data with the new results.
-
-    `before` contains the earlier results of all libraries. The results of libraries that are not measured
-    remain.
-    """
+    """Return `before` with new results of the given libraries."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": draw_configurations(robots[name])}

@@ -54,7 +54,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Warnings that robots of the catalogue cause: the code of the warning, and an explanation.
+#: Warnings of catalogue robots, each with an explanation.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -66,7 +66,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Options of `urdfkin check` that limit the size of the input, with the default limit and the unit.
+#: Options of `urdfkin check` for sizes, with default and unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
@@ -125,7 +125,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # Some entries have no description. The page then shows the description of the entry's data type.
+            # The description of the data type replaces a missing description.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -136,7 +136,6 @@ def make_reports_parts() -> dict[str, str]:
 
 
 def _format_type(entry: dict[str, Any]) -> str:
-    """Return a type as text, such as `number or null` or `list of Check`."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:
@@ -165,7 +164,7 @@ STUDIED_ROBOTS = {
     "polar": "polar robot of the textbook",
 }
 MOVING_BASE_ROBOTS = ("talos", "anymal", "ur5")
-#: Numbers of samples of each robot in the accuracy study and in the table of enclosures.
+#: Samples per robot in the accuracy study and for enclosures.
 SAMPLES, ENCLOSURE_SAMPLES = 10, 5
 
 
@@ -235,13 +234,13 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # `steps` is the largest width of an interval, in steps between neighbouring doubles.
-            # The distance between doubles is taken at the largest absolute value of the quantity.
+            # `steps`: largest interval width, in distances of neighbouring doubles
+            # at the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Exact results have intervals of width 0 and are not counted.
+            # Exact results have intervals of width 0.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")
@@ -260,7 +259,7 @@ def _chain_rows() -> Iterator[tuple[object, ...]]:
 
 
 def _compute_enclosures(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return interval results of random motions, and the processor time (ms) per motion."""
+    """Return enclosures, and the time (ms) per motion."""
     enclosures, times = [], []
     for seed in (0, *range(count)):  # The first motion is not timed.
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))

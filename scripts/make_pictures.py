@@ -31,7 +31,6 @@ THEMES = (("", False), ("-dark", True))
 
 
 def draw_reference_frames() -> Any:
-    """Draw the planar arm of docs/reference-frames.md, with a panel for each reference frame."""
     arm, q, v = urdfkin.load("planar_two_link"), [0.0, np.pi / 2], [1.0, 1.0]
     figure, panels = plt.subplots(1, 3, figsize=(9.6, 3.6), sharey=True, layout="constrained")
     points = arm.placement(q, ["base", "link_2", "tip"])[:, :2, 3]

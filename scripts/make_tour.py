@@ -59,7 +59,7 @@ def label_plane(axes: Any, title: str) -> None:
 
 
 def draw_one_link(figure: Any) -> None:
-    """Draw a rotating link and its endpoint's velocity (figure 7.1)."""
+    """Draw a rotating link (figure 7.1)."""
     axes = figure.subplots()
     a1, rate = 0.8, 1.2
     circle = link_endpoint(np.linspace(0, 2 * np.pi, 200), a1)
@@ -74,7 +74,6 @@ def draw_one_link(figure: Any) -> None:
 
 
 def draw_velocity_field(figure: Any) -> None:
-    """Draw the velocity field w x p of a rotating body, in a plane that is not perpendicular to the axis."""
     axes = figure.add_subplot(projection="3d")
     k = np.array([1.0, 0.4, 2.0]) / np.linalg.norm([1.0, 0.4, 2.0])
     x, y = np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 7))
@@ -96,13 +95,12 @@ def draw_velocity_field(figure: Any) -> None:
 
 
 def draw_integral_of_w(figure: Any) -> None:
-    """Draw two different orientations with the same integral of w (example 7.3 and figure 7.9)."""
+    """Draw example 7.3 (figure 7.9)."""
     cases = (("case 1: about x0, then about y0", (0, 1)), ("case 2: about y0, then about x0", (1, 0)))
     times = np.linspace(0.0, 2.0, 201)
     for row, (title, order) in enumerate(cases):
 
         def w(t: float, order: tuple[int, int] = order) -> FloatArray:
-            """Return the angular velocity: 90 deg/s about axis `order[0]` for 1 s, then about `order[1]`."""
             axis: FloatArray = np.eye(3)[order[0 if t < 1.0 else 1]]
             return np.pi / 2 * axis
 
@@ -124,10 +122,6 @@ def draw_integral_of_w(figure: Any) -> None:
 
 
 def plot_euler_singularity(figure: Any) -> None:
-    """Plot the condition number of the matrix Omega against the middle Euler angle.
-
-    Omega converts the rates of the Euler angles to the angular velocity.
-    """
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):
@@ -143,8 +137,6 @@ def plot_euler_singularity(figure: Any) -> None:
 
 
 def plot_convergence(figure: Any) -> None:
-    """Plot the error of the integrated quaternion against the step size."""
-
     def angles(t: float) -> FloatArray:
         return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])
 
@@ -170,7 +162,7 @@ def plot_convergence(figure: Any) -> None:
 
 
 def draw_acceleration_parts(figure: Any) -> None:
-    """Draw a point that slides on a rotating arm, and its acceleration (7.125)."""
+    """Draw a sliding point's acceleration (7.125)."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
     z = np.array([0.0, 0.0, 1.0])
@@ -198,7 +190,7 @@ def draw_acceleration_parts(figure: Any) -> None:
 
 
 def _write_name(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
-    """Write a name to the right of an arrow, so that readers need not rely on the arrow's colour."""
+    """Name an arrow for readers who cannot see colours."""
     side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     place = at[:2] + 0.04 * side
     axes.text(*place, name, ha="left" if side[0] > 0.0 else "right", va="center", fontsize=9)

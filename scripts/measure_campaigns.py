@@ -36,7 +36,7 @@ def validate_with_store(*robots: Any, **options: Any) -> ValidationReport:
 
 
 def validate_on_cluster(*robots: Any, **options: Any) -> ValidationReport:
-    """Validate with two local Dask workers. The printed times exclude starting and stopping the workers."""
+    """Validate with two local Dask workers."""
     with connect_cluster("local:2") as cluster:
         validate("planar_two_link", samples=400, executor=cluster)  # the workers load their modules
         chunks = len(Chunking(options["samples"])) * len(robots[0])

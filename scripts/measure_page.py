@@ -36,7 +36,7 @@ _UNFOLD = """
 
 
 def make_report(robots: int) -> Document:
-    """Return a report with the given number of robots. The script copies the results of a few real robots."""
+    """Copy the results of a few robots many times."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     few = islice(cycle(document["robots"]), robots)
     document["robots"] = [robot | {"source": f"fleet/{i:04}.urdf"} for i, robot in enumerate(few)]

@@ -20,9 +20,9 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes (bytes) of a package and its dependencies.
+    """Return the sizes (bytes) of packages.
 
-    The result omits the package `without`, and every package that only this package requires.
+    Omit `without`, and packages that only `without` requires.
     """
     sizes: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
@@ -45,7 +45,7 @@ def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -
 
 
 def measure_wheel() -> int:
-    """Return the size (bytes) of urdfkin's unpacked wheel."""
+    """Return the unpacked wheel's size (bytes)."""
     places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
     files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")

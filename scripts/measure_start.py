@@ -32,13 +32,13 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     name: str  # label of the row on the page
-    arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
-    max_ratio: float = math.inf  # limit of the time, as a multiple of the time of `import numpy, pinocchio`
+    arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is a URDF file
+    max_ratio: float = math.inf  # time limit, in times of `import numpy, pinocchio`
     empty_cache: bool = False  # True: the process finds no compiled kernels on disk.
 
 
 _JACOBIAN = ("-c", _COMMAND, "jacobian", "ROBOT", "--q", "random")
-#: The time of the first row is the denominator of all ratios.
+#: All ratios refer to the time of the first row.
 ROWS = (
     Row("`import numpy, pinocchio`", ("-c", "import numpy, pinocchio")),
     Row("`urdfkin --help`", ("-c", _COMMAND, "--help")),
@@ -68,9 +68,9 @@ def measure_seconds(words: Sequence[str], cache: Path | None) -> float:
 
 
 def measure_medians(rounds: int, folder: Path) -> list[float]:
-    """Return the median processor time (s) of each row.
+    """Return each row's median processor time (s).
 
-    The times of the first round do not count, because Python then compiles the modules to bytecode.
+    In the first round, Python compiles the modules to bytecode.
     """
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())

@@ -44,7 +44,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Files that Numba compiles. The script skips these files, because it changes the syntax tree of a module.
+#: The script changes Python modules, not files that Numba compiles.
 #: Numba reads the source text instead.
 #: tests/laws/test_mutation.py tests mutants of these files without Numba.
 COMPILED = {
@@ -77,10 +77,7 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the tests that mention a module, and the tests of the module's package.
-
-    If the package has no tests, the tests in `test_robot.py`, `verify` and `laws` are returned.
-    """
+    """Return the tests of a module and its package."""
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -105,15 +102,14 @@ def find_near_tests(path: Path) -> list[str]:
 class NamedMutant:
     claim: str  # the mistake that must be detected
     #: Full name of the function, for example `urdfkin.dh.snapping.snap_report`.
-    #: If the code is outside functions, the full name of the module.
+    #: Outside functions, the module's full name.
     function: str
     before: str  # code that occurs exactly once in the function
     after: str  # the code that replaces `before`
-    test: str  # the test that fails with the mutant and passes without it
+    test: str  # the test that fails only with the mutant
 
     @property
     def file(self) -> Path:
-        """The file that contains the code to replace."""
         path = ROOT
         for name in self.function.split("."):
             if not (path / name).is_dir():
@@ -124,7 +120,7 @@ class NamedMutant:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """The last three arguments of `replace_code`: the function's name, the old code and the new code."""
+        """The last three arguments of `replace_code`."""
         return self.function[len(module_name(self.file)) + 1 :], self.before, self.after
 
 
@@ -135,10 +131,7 @@ def named_mutants() -> list[NamedMutant]:
 
 @cache
 def harmless_mutants() -> dict[tuple[str, str], str]:
-    """Read the harmless mutants from docs/mutation.md, each with the reason why it is harmless.
-
-    A key is a pair: the full name of the mutated function, and a text such as `1  ->  2`.
-    """
+    """Read docs/mutation.md: {(function, change): reason}."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -151,12 +144,12 @@ class Mutant:
     file: str
     line: int
     change: str  # the text before and after
-    function: str  # the function that contains the mutant; line numbers change more often than this name
+    function: str  # the function with the mutant; line numbers change more often
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a mutant: `detected` by a test, `survived`, `too slow`, or `harmless`."""
+    """A mutant's result: `detected`, `survived`, `too slow` or `harmless`."""
 
     mutant: Mutant
     result: str
@@ -193,13 +186,13 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        result = "not run"  # pytest reports an error, but not a failure of the named test.
+        result = "not run"  # pytest reports an error instead of a test failure.
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
     return Outcome(mutant, result, detail)
 
 
-#: The fork server imports the foreign libraries once, because this takes longer than most tests.
+#: The fork server imports foreign libraries once, to save time.
 _FORK_SERVER = multiprocessing.get_context("forkserver")
 _FORK_SERVER.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
@@ -221,7 +214,6 @@ def _run_in_process(change: dict[str, str], tests: list[str], timeout: float) ->
 
 
 def _run_tests(change: dict[str, str], tests: list[str], output: str) -> None:
-    """Run the tests on a mutant in this process and its children, and exit with pytest's code."""
     import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"

@@ -8,10 +8,7 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def insert_parts(page: str, **parts: str) -> str:
-    """Insert the given parts into a page, and return the page.
-
-    The name of a part is the name in its comment. Raise ValueError if the page has no comment for a part, or
-    has several comments with the same name.
+    """Insert the given parts into a page.
 
     >>> print(insert_parts("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->
@@ -33,7 +30,9 @@ def update_page(path: Path, **parts: str) -> None:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]], left: int | None = None) -> str:
-    """Return a Markdown table; the columns after the first `left` ones are right-aligned.
+    """Return a Markdown table.
+
+    Columns after the first `left` are right-aligned.
 
     >>> print(table(("robot", "joints"), [("ur5", 6)], left=1))
     | robot | joints |

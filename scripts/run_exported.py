@@ -22,7 +22,7 @@ from typing import Any
 
 
 def error_ratios(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield the name of each check, and the largest ratio of an error to its bound."""
+    """Yield each check's name and largest error ratio."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -75,7 +75,7 @@ def check_compiled(scope: dict[str, Any]) -> float:
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio of an error to its bound. NaN counts as the largest number."""
+    """Return the largest ratio; NaN counts as largest."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

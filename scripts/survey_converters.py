@@ -49,8 +49,6 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    """A converter of robot files."""
-
     reads: str  # The tool that writes the input file. Empty: the input file is the URDF.
     program: str  # Python code that converts the file `source`.
     writes: str = ""  # End of the output file's path. Empty: the program prints the path.
@@ -92,8 +90,8 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts. A short form applies to a verdict that begins with the key.
-#: If a verdict begins with several keys, the first key counts.
+#: Short forms of verdicts that begin with a key.
+#: The first matching key counts.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -101,16 +99,15 @@ _SHORT = {
     "not compared": "not readable",
 }
 _QUOTED = 120
-#: Settings with which MuJoCo accepts bodies without mass, or with an impossible inertia.
+#: MuJoCo then accepts bodies with no mass or impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 
 class RefusalError(Exception):
-    """A converter refuses a robot, or its result cannot be compared."""
+    """A robot cannot be converted or compared."""
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Convert a URDF, and return the paths of the tool's input file and of the tool's output file."""
     reads, program, writes = TOOLS[tool]
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
@@ -140,7 +137,7 @@ def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sam
 
 
 def _write_without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a copy of a URDF without shapes and with the settings `_LENIENT` for MuJoCo.
+    """Write a URDF without shapes, with settings for MuJoCo.
 
     Other tools ignore these settings.
     """
@@ -155,11 +152,12 @@ def _write_without_shapes(urdf: str, folder: Path) -> Path:
 
 
 def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
-    """Return the verdict, and bounds on the distance and on the angle between matching frames.
+    """Return the verdict and two bounds.
 
-    The bounds are for the source and the converted robot as they are. The tool `urdf-usd-converter` has other
-    cells: the bound on the distance is for the models after changes that make the two models as similar as
-    possible. The third cell is then the largest distance that rounding to single precision can cause.
+    | tool | second cell | third cell |
+    |---|---|---|
+    | `urdf-usd-converter` | distance of the aligned models | effect of single precision |
+    | another tool | distance as written | angle as written |
     """
     try:
         comparison = _compare(tool, pythons, robot)
@@ -189,7 +187,7 @@ def make_wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> 
 
 
 def _load(file: Path) -> urdfkin.Robot:
-    """Load a robot from a file. If a USD file has several articulations, load all of them as one robot."""
+    """Load a file; several articulations become one robot."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

@@ -38,13 +38,12 @@ class Contender:
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
     #: Function that yields the timed tasks for batches.
-    #: Without this function, the benchmark calls the library once for each configuration, in a loop.
+    #: None: the benchmark calls the library in a loop.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
     @property
     def reason_missing(self) -> str | None:
-        """Return the reason why the library cannot run, or None."""
         if util.find_spec(self.module) is None:
             return "not installed"
         if self.program and shutil.which(self.program) is None:
@@ -70,9 +69,9 @@ class Contender:
 
 
 def urdfkin_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
-    """Yield the timed tasks for a batch, with different numbers of threads and output arrays.
+    """Yield a batch's timed tasks.
 
-    The task `FLOOR` computes nothing and only writes the output array.
+    The task `FLOOR` only writes the output array.
     """
     method, n = getattr(workload.robot, quantity), workload.n
     inputs = workload.inputs(quantity, n)
@@ -92,10 +91,6 @@ def urdfkin_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def urdfkin_calls(workload: Workload, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the timed calls of a method, for example `robot.jacobian` and `robot.prepare(frame).jacobian`.
-
-    If `verify` is False, also yield the calls of the same method of `robot.compile(frame)`.
-    """
     robot, frame = workload.robot, workload.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(workload.result_shape(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -114,7 +109,6 @@ def urdfkin_calls(workload: Workload, quantity: str, *, verify: bool = False) ->
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the fastest calls of Pinocchio that compute a quantity."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,
@@ -143,7 +137,6 @@ _worker_state: dict[str, Any] = {}
 
 
 def pinocchio_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
-    """Yield two ways to compute a batch with Pinocchio: a loop, and processes with shared memory."""
     yield pinocchio_calls(workload.urdf, workload.frame, quantity).make_batch_task(workload, quantity)
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
@@ -188,15 +181,15 @@ LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """Return a list of indices: element i is the position in `ours` of the name `theirs[i]`."""
+    """Return the position in `ours` of each name in `theirs`."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Add columns of zeros to Jacobians `J` (n, 6, m), and return Jacobians (n, 6, nv).
+    """Fill Jacobians with columns of zeros.
 
-    Column k of `J` becomes the column `columns[k]` of the result.
+    Column k of `J` becomes column `columns[k]`.
     """
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
@@ -206,8 +199,9 @@ def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 def dynibo(workload: Workload, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo.
 
-    dynibo's Jacobians have rows [angular; linear], and one column for each joint. The columns are in
-    breadth-first order of the joints. dynibo returns the elements of a matrix column by column.
+    The rows are [angular; linear].
+    The columns are in breadth-first order of the joints.
+    The elements are stored column by column.
     """
     import dynibo
 
@@ -248,7 +242,6 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(workload: Workload, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of MuJoCo, which has rows [angular; linear]."""
     import mujoco
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
@@ -283,7 +276,6 @@ def mujoco(workload: Workload, quantity: str) -> Iterator[Calls]:
 
 
 def drake(workload: Workload, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of Drake, which has rows [angular; linear]."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import JacobianWrtVariable
@@ -320,7 +312,6 @@ def drake(workload: Workload, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the Robotics Toolbox; an acceleration is J a + Jdot v."""
     import roboticstoolbox as rtb
 
     with warnings.catch_warnings():
@@ -348,14 +339,14 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     yield Calls(label, names, lines, order=order, remark=remark)
 
 
-#: Larger calls of PyTorch Kinematics take more time per configuration.
+#: Larger calls of PyTorch Kinematics are slower per configuration.
 _MAX_BATCH = 20_000
-#: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
+#: PyTorch Kinematics reads angles in single precision.
 _SINGLE_TOLERANCE = 1e-6
 
 
 def torch(workload: Workload, quantity: str) -> Iterator[TimedTask]:
-    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`.
+    """Yield Jacobians with and without `torch.compile`.
 
     PyTorch Kinematics has no function for accelerations.
     """
@@ -384,7 +375,6 @@ def torch(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def jax(workload: Workload, quantity: str) -> Iterator[TimedTask]:
-    """Yield the textbook's equations on JAX arrays, compiled for a batch by `vmap` and XLA."""
     import jax
     import jax.numpy as jnp
 

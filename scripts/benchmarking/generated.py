@@ -42,10 +42,9 @@ _Z = (0.0, 0.0, 1.0)
 def frame_results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Return the numbers of a frame's Jacobian or acceleration in world axes, row by row.
+    """Return a frame's results in world axes.
 
-    The Jacobian uses equation 7.85. The acceleration uses equations 7.127 to 7.130. Each joint has one
-    coordinate. The inputs can be arrays or symbols; `eq` contains the equations for this type.
+    The equations are 7.85 (Jacobian) and 7.127 to 7.130 (acceleration).
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):
@@ -84,9 +83,10 @@ def generated_tasks(workload: Workload, quantity: str) -> Iterator[TimedTask]:
 
 
 def compile_function(workload: Workload, quantity: str) -> Callable[..., None]:
-    """Compile the C code, and return its function.
+    """Compile the C code.
 
-    The function's arguments are the batch size and the addresses of the arrays q, v, a and `out`.
+    Returns:
+        Function of the batch size and the addresses of q, v, a, `out`.
     """
     plan, folder = workload.plan, workload.folder
     is_revolute = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE
@@ -119,7 +119,6 @@ def _join(numbers: Sequence[float]) -> str:
 
 
 def _generate_code(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code for one configuration. The inputs are x, sines, cosines, v and a."""
     import casadi
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
@@ -130,7 +129,7 @@ def _generate_code(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # Replace doubles by SIMD vectors, and remove CasADi's tests for missing arguments.
+    # Use SIMD vectors, and remove CasADi's tests for missing arguments.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

@@ -21,11 +21,10 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Names of two times (ms): a process computes a quantity for the first time.
-#: In one process, the kernel cache is empty. In the other process, the cache contains all kernels.
+#: Times until the first result, ms: with an empty kernel cache, and with all kernels in the cache.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` whose first call compiles a kernel, each with the number of its inputs.
-#: Number of inputs 1: q; 2: q and v; 3: q, v and a.
+#: Methods of `Robot` that compile a kernel, with their inputs:
+#: 1: q; 2: q and v; 3: q, v and a.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -54,12 +53,11 @@ def describe_machine() -> dict[str, object]:
 
 
 def measure_memory(robot: str, frame: str, quantity: str, n: int, *, out: bool) -> dict[str, Any]:
-    """Return the peak memory of computing `n` results, and the size of the results, in bytes."""
+    """Return the peak memory and the result's size (bytes)."""
     return _run_in_process("memory", robot, frame, quantity, str(n), "out" if out else "fresh")
 
 
 def measure_first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of each quantity's first call, with an empty and with a full kernel cache."""
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:

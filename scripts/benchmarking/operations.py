@@ -24,25 +24,25 @@ from urdfkin.compiled.plan import (
 )
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
-#: The reduction of the angle to r takes 10 operations.
-#: The computation of z = r^2, of 1 - z/2 and of their rounding errors takes 8 operations.
-#: The polynomials take 20 operations, and the last steps take 13.
+#: Operations for sine and cosine of one angle (`compiled.python_numbers`):
+#: 10 for the reduction of the angle to r,
+#: 8 for z = r^2, 1 - z/2 and their rounding errors,
+#: 20 for the polynomials, 13 for the last steps.
 _SINE_COSINE = 51
 
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number without a value, which records the operation that yields the number.
+    """A number that records an operation instead of a value.
 
-    The field `operands` contains the two numbers that this operation combines; it is empty for an input or a
-    constant. The field `constant` is 0 for the constant zero, 1 for the constant one, and None for every
-    other number.
+    Attributes:
+        constant: 0 or 1; None for any other number.
+        operands: Two operands; empty for an input or a constant.
     """
 
     constant: int | None = None
-    #: True for a number that has no effect on the results.
-    #: An operation is not counted if an operand has no effect on the results.
+    #: True for a number without effect on the results.
+    #: Operations with such an operand are not counted.
     unused: bool = False
     operands: tuple[Number, ...] = ()
 
@@ -75,7 +75,7 @@ class Number:
 
 
 def count_shared(results: Any) -> int:
-    """Return the number of operations that compute the results. A shared operation counts once."""
+    """Count the operations; a shared operation counts once."""
     waiting, visited = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -90,7 +90,7 @@ def count_shared(results: Any) -> int:
 
 @dataclass
 class _RecordedRecursion:
-    """The functions of the forward recursion, called with `Number` so that operations can be counted."""
+    """The forward recursion, called with `Number`."""
 
     written: list[Any] = field(default_factory=list)
 
@@ -125,7 +125,7 @@ class _RecordedRecursion:
 
 
 def count_operations(plan: CompiledTree, quantity: str) -> int:
-    """Count operations for one frame in LOCAL_WORLD_ALIGNED: "jacobian", "velocity" or "acceleration"."""
+    """Count the operations for one frame in LOCAL_WORLD_ALIGNED."""
     columns = quantity == "jacobian"
     program, run = compile_program(plan, orientations=False, columns=columns), _RecordedRecursion()
     words: list[int] = program.words.tolist()

@@ -40,12 +40,14 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 
 
 def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure the times of Jacobians and accelerations, and compare the results with Pinocchio's results.
+    """Measure the Jacobians and the accelerations of a section.
 
-    The section `batch` measures batches of all contenders. The section `single` measures calls of all
-    contenders for one configuration. The sections `checked` and `verified` measure urdfkin and Pinocchio. In
-    the section `checked`, urdfkin computes one configuration per call, and checks each result. The section
-    `verified` measures batches of urdfkin with `verify=True`, with `verify="sample"`, and without a check.
+    | section | libraries | calls |
+    |---|---|---|
+    | `batch` | all | batches |
+    | `single` | all | one configuration |
+    | `checked` | urdfkin, Pinocchio | one configuration; urdfkin checks each result |
+    | `verified` | urdfkin, Pinocchio | batches with `verify=True`, `"sample"` and False |
     """
     for workload, quantity, table in _open_workloads(section, n):
         title = f"{workload.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
@@ -107,7 +109,7 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains with the given numbers of joints.
 
-    The size of a batch depends on the chain: all Jacobians of a batch have about `numbers` elements together.
+    A batch of Jacobians has about `numbers` elements.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -152,14 +154,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# The computation of a batch has several steps, for example the forward recursion.
-# The benchmark measures a kernel for only the first step, a kernel for the first two steps, and so on.
-# The time of step k is the time of the kernel for k steps, minus the time of the kernel for k - 1 steps.
-# For one configuration, the benchmark measures seven lines of Python (`_calls`); most lines omit some steps.
-# For example, the forward recursion does not run in the line that passes a tuple instead of an array `out`.
-# The time of a step is computed from differences between the times of the lines.
+# Steps of a batch, for example the forward recursion:
+# the time of step k is the time of the first k steps, minus the time of the first k - 1 steps.
+# Steps of one configuration: time differences between seven lines of Python (`_calls`).
+# For example, `compute` rejects a tuple as `out`, and then omits the forward recursion.
 
-#: The kernel's instructions for each step of a batch, in the order of the steps.
+#: Instructions for each step of a batch.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -170,7 +170,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step of a batch computation, in ns per configuration."""
+    """Yield the time of each step, in ns per configuration."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [
@@ -187,7 +187,7 @@ def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 def truncate_program(program: KernelProgram, parts: int) -> KernelProgram:
-    """Return a copy of a program that contains only the instructions of the first `parts` steps."""
+    """Copy the first `parts` steps of a program."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
     code = words[words[ProgramHeader.CODE] :].reshape(-1, INSTRUCTION_WIDTH)
@@ -217,7 +217,7 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
 
 
 def call_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time (ns) of each step of a call for one configuration."""
+    """Yield the time (ns) of each step."""
     for workload, quantity, _ in _open_workloads("where", n):
         calls = list(_calls(workload, quantity))
         tasks = [call.make_single_task(workload, quantity) for call in calls]
@@ -257,9 +257,9 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # This line calls no function, so the measured time is the time of the loop.
+        "q",  # No function call: the time of the loop alone.
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
+        f"compute({q_v_a}, shape)",  # `compute` rejects a tuple as `out`.
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
@@ -271,10 +271,6 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
 def _make_entry(
     kind: str, workload: Workload, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return the median time of each step over all rounds.
-
-    In each round, the time of a step is computed only from times of the same round.
-    """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": workload.name, "quantity": quantity, "ns": ns, "parts": medians}

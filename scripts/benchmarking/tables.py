@@ -17,8 +17,8 @@ Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: Sections with measurements for several numbers of joints, frames or configurations.
-#: Each value is the title of the section's table, and a function that returns the cells of a row.
+#: Sections with several numbers of joints, frames or configurations:
+#: title of the table, and function that returns a row's cells.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -53,7 +53,11 @@ _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as text. Each element of `cells` is a row: a mapping from headings to cells."""
+    """A table as text.
+
+    Attributes:
+        cells: Rows, which map headings to cells.
+    """
 
     section: str
     title: str
@@ -124,10 +128,7 @@ def make_tables(figures: Mapping[str, Any]) -> Iterator[TextTable]:
 
 
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
-    """Insert the figures into the page, at comments such as `<!-- figures: machine -->`.
-
-    Raise ValueError if the page has no comment for a figure, or has two equal comments.
-    """
+    """Insert the figures into the page."""
     parts: dict[str, list[str]] = {"machine": [format_machine(figures)]}
     for words in make_tables(figures):
         parts.setdefault(words.section, []).append(words.text)
@@ -181,7 +182,6 @@ def _generated_time(rows: Sequence[Entry]) -> float | None:
 
 
 def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
-    """Compare urdfkin with Pinocchio's loop, with the generated code and with the fastest other library."""
     rows = {row["label"]: row for row in group}
     several = next((row for row in group if _SEVERAL.fullmatch(row["label"])), None)
     one_thread_ns, ceiling = float(rows[ONE]["median_ns"]), _generated_time(group)
@@ -205,7 +205,6 @@ def _compare_with_best(title: str, group: list[Entry]) -> dict[str, str]:
 
 
 def _compare_with_limits(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
-    """Return urdfkin's time, the time to write the output, and the bytes and operations per nanosecond."""
     rows = {row["label"].partition(",")[0]: row for row in reversed(group)}
     fill, ns = rows[FLOOR], rows["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]

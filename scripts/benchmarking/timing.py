@@ -17,18 +17,22 @@ import numpy as np
 from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference (m, rad, m/s^2, rad/s^2) between contenders; it is much larger than rounding.
+#: Allowed difference between contenders, much larger than rounding.
 TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class TimedTask:
-    """A timed task. One call of `compute` computes the first `n` configurations of the workload."""
+    """A timed task.
+
+    Attributes:
+        n: Number of configurations that `compute` computes.
+    """
 
     label: str
     n: int
     compute: Callable[[], object]
-    #: Function that returns the results in urdfkin's conventions, for a comparison with another task.
+    #: Function that returns the results in urdfkin's conventions.
     #: None: the results are not compared.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE
@@ -37,10 +41,12 @@ class TimedTask:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table: the measurements of one contender.
+    """The measurements of one contender.
 
-    `numbers` is the number of values in the result for one configuration, and `n` is the number of
-    configurations of a call. The table varies `size`, a number of joints, frames or configurations.
+    Attributes:
+        numbers: Number of values in one result.
+        size: Number of joints, frames or configurations.
+        n: Number of configurations in a call.
     """
 
     section: str
@@ -52,20 +58,17 @@ class Row:
     n: int = 0
     median_ns: float = 0.0
     minimum_ns: float = 0.0
-    #: Median time of the baseline, divided by the median time of the contender.
+    #: Median time of the baseline / median time of the contender.
     ratio: float | None = None
     remark: str = ""
 
 
 class DifferenceError(Exception):
-    """The results of contenders differ, so their times are not comparable."""
+    """The results of contenders differ."""
 
 
 def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str) -> None:
-    """Compute all results once as a warm-up.
-
-    Raise DifferenceError if the result of a task differs from the result of `reference`.
-    """
+    """Compare all results with the result of `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -87,7 +90,7 @@ def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str
 def measure_times(
     tasks: Sequence[TimedTask], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
-    """Return the times (ns) for one configuration, one for each round."""
+    """Return the times (ns) for one configuration, by round."""
     times: dict[str, list[float]] = {task.label: [] for task in tasks}
     shuffled, order = list(tasks), random.Random(0)
     gc.disable()
@@ -111,7 +114,7 @@ def measure_rows(
     baseline: TimedTask | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
-    """Measure tasks that have already run once, so that their kernels are compiled."""
+    """Measure tasks that have already run once."""
     times = measure_times(tasks, rounds, clock)
     medians = {label: float(np.median(values)) for label, values in times.items()}
     return [
@@ -130,28 +133,28 @@ def measure_rows(
 
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library for one configuration.
+    """The lines of Python that call a library.
 
-    The lines become the body of a loop, so the measured time includes no call of the benchmark itself.
+    The timed loop contains the lines, without another function call.
     """
 
     label: str
-    #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
+    #: Variables of the lines, besides `q`, `v` and `a`.
     names: Mapping[str, Any]
-    #: Lines that compute one result. The last line is an expression; its value is the result.
+    #: Lines that compute one result, the value of the last line.
     lines: tuple[str, ...]
-    #: Lines that compute the result of configuration k, and write the result into `out[k]`.
-    #: None: the benchmark uses `lines`, and writes the value of the last line into `out[k]`.
+    #: Lines that write the result of configuration k into `out[k]`.
+    #: None: `lines` compute it.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: None: the library and urdfkin have the same order of coordinates.
+    #: None: urdfkin's order of coordinates.
     order: list[int] | None = None
-    #: Shape of the library's result for one configuration, as in `out[k]`.
-    #: None: the library's result has the same shape as urdfkin's result.
+    #: Shape of the library's result for one configuration.
+    #: None: the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
     #: Converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    #: Converts the result of one call to an array with the layout of `out[k]`.
+    #: Converts a call's result to the layout of `out[k]`.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 
@@ -163,14 +166,12 @@ class Calls:
         return TimedTask(self.label, workload.loop, run, result, remark=self.remark)
 
     def make_loop(self) -> Callable[..., None]:
-        """Return a function that loops over a batch and writes the results to `out`."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _compile_function(
             self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body
         )
 
     def make_single_task(self, workload: Workload, quantity: str) -> TimedTask:
-        """Return the timed task for single calls. The timed loop does not store results."""
         inputs = [list(self._reorder(x)) for x in workload.inputs(quantity, workload.loop)]
         rows = list(_rows(inputs))
         repeat = _compile_function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
@@ -187,17 +188,13 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield q, v and a of each configuration. If the quantity has only the input q, q replaces v and a."""
+    """Yield (q, v, a); with one input, (q, q, q)."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 
 def _compile_function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Compile a function from lines of Python: a compound statement `head` with the body `body`.
-
-    The lines can use the variables `names`.
-    """
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: Most joints of the humanoid talos do not move the chosen frame.
+#: Most joints of talos do not move this frame.
 ROBOT_FRAMES = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls.
 LOOP = 2_000
@@ -23,9 +23,9 @@ TIP = "tip"
 
 
 class Workload:
-    """The common input of all contenders: one robot and frame, q (n, nq), v and a (n, nv).
+    """The common input of all contenders.
 
-    The robot is loaded without mimic rules, so that every library has the same coordinates.
+    Without mimic rules, every library has the same coordinates.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
@@ -77,10 +77,9 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """Return a copy of a URDF without shapes and mimic rules.
+    """Return a copy without shapes and mimic rules.
 
-    All links of the copy have the same mass and inertia, because some libraries need inertias. Some libraries
-    add a body `world`, so a link or joint with this name is renamed.
+    Some libraries need inertias. Some libraries add a body `world`.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))
@@ -100,7 +99,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 
 
 def chain_urdf(joints: int, seed: int = 0) -> str:
-    """Return a chain of revolute joints with oblique axes and links of 0.1 m."""
+    """Return a chain of revolute joints with oblique axes."""
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

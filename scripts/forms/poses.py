@@ -17,7 +17,6 @@ from typing import Any
 
 
 def compute_poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]:
-    """Return a 4 x 4 pose for each configuration."""
     scope: dict[str, Any] = {"__name__": "table"}
     exec(compile(text, form, "exec"), scope)
     if form in ("roboticstoolbox", "ets"):

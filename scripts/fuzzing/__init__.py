@@ -27,7 +27,8 @@ class Case:
 class Outcome:
     """The outcome of a test.
 
-    If the test passed, `result` is an element of `PASSED`. If the test failed, `result` names the failure.
+    Attributes:
+        result: An element of `PASSED`, or the failure.
     """
 
     result: str

@@ -26,22 +26,22 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
+#: Findings about sizes beyond floating point; results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
-#: The script compares a call for several frames with calls for single frames.
-#: At most this number of frames have a call for a single frame.
+#: Calls for several frames are compared with calls for single frames.
+#: Maximum number of single frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
-#: Distance of the far base from the world's origin, in metres.
+#: Distance of the far base from the origin, m.
 FAR = 1e6
-#: Quantities that one call can compute for several frames. A value is the number of inputs among q, v and a.
+#: Quantities of several frames, with their numbers of inputs.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
 class MismatchError(Exception):
-    """Two computations of one number return different results."""
+    """Two computations return different results."""
 
 
 def evaluate(case: Case) -> Outcome:
@@ -104,7 +104,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
     if verified:
         return Outcome("verified")
-    # Unchecked results are acceptable only if a finding states why they are unchecked.
+    # A finding must state why results are unchecked.
     for finding in findings:
         if finding.pinocchio_reading is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)
@@ -115,10 +115,7 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
 
 
 def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the name and the result of each checked computation.
-
-    Raise MismatchError if two computations of one number differ. Singular representations are skipped.
-    """
+    """Yield the name and result of each checked computation."""
     generator = np.random.default_rng(seed)
     inputs = _draw_inputs(robot, seed)
     frames = robot.all_frames
@@ -144,10 +141,7 @@ def compute_all(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def compare_prepared(robot: Robot, seed: int) -> None:
-    """Compare unchecked results of a prepared frame with checked results of the robot's methods.
-
-    Raise MismatchError if two results differ.
-    """
+    """Compare a prepared frame with the robot's methods."""
     inputs = [x[0] for x in _draw_inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
@@ -192,10 +186,6 @@ def _compare_calls(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield results for several frames and configurations.
-
-    Raise MismatchError if a call for one frame or one configuration returns a different result.
-    """
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -221,14 +211,13 @@ def _compare_calls(
 def _placements_by_name(
     robot: Robot, q: FloatArray, generator: np.random.Generator
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name. urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     names = sorted(links | joints)
     prefixed_names = [f"{prefix}{name}" for name in names for prefix in ("", "link:", "joint:")]
     for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
             yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
-        except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
+        except UnknownNameError:  # For example, `joint:x` is unknown without a joint x.
             if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.
@@ -237,10 +226,7 @@ def _placements_by_name(
 
 
 def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the placements that Denavit-Hartenberg tables give for the frames.
-
-    Each table describes the path from the root to a frame. Paths with a planar or floating joint are skipped.
-    """
+    """Yield the placements of Denavit-Hartenberg tables."""
     tree = robot.tree
     for frame in frames:
         if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):

@@ -19,11 +19,11 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Relative tolerance for the placements of urdfkin, which are compared with MuJoCo's placements.
-#: Equality constraints have a relative tolerance of 1000 * _TOLERANCE.
+#: Relative tolerance of placements against MuJoCo.
+#: Equality constraints have 1000 times this tolerance.
 _TOLERANCE = 1e-12
 
-# Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
+# MuJoCo must not write a log into the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 
@@ -153,10 +153,7 @@ def compile_model(data: bytes) -> mujoco.MjModel | None:
 
 
 def find_difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Return a message about the first difference from MuJoCo, or None if there is no difference.
-
-    The placements of bodies and sites are compared, and the equality constraints are checked.
-    """
+    """Return a message about the first difference from MuJoCo."""
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = {

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: The script makes mutants of files up to this size in bytes. Mutants of larger files are slow to test.
+#: Maximum size of a mutated file, bytes.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -43,7 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: `_STRUCTURE` occurs three times, because urdfkin rejects most mutants of the other families.
+#: Other families give mostly rejected mutants.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -86,12 +86,12 @@ def _change_tokens(rng: random.Random, kind: str, data: bytes) -> bytes:
         odd = (b"\n", b"<!DOCTYPE robot>", b'<!DOCTYPE r [<!ENTITY a "b">]>', b"<!-- -->", b"text")
         return rng.choice(odd) + data
     pattern = {"odd_number": _NUMBER, "odd_blank": re.compile(rb" ")}.get(kind, _VALUE)
-    # Take the first match after a random position, which is faster than finding all matches.
+    # The first match after a random position is faster than all matches.
     starts = [rng.randrange(len(data) + 1) for _ in range(2)]
     first, second = (pattern.search(data, position) or pattern.search(data) for position in starts)
     if first is None or second is None:
         return data
-    group = pattern.groups  # Group 2 is an attribute's value, and group 0 is the whole match.
+    group = pattern.groups  # Group 2 is an attribute's value, group 0 the whole match.
     if kind == "swap_values":
         if first.start() == second.start():
             return data
@@ -113,7 +113,7 @@ def _change_tree(rng: random.Random, kind: str, data: bytes) -> bytes:
         return data
     if root.tag != "robot":
         return data
-    # A file without the chosen kind of element stays unchanged.
+    # Files without this element stay unchanged.
     with contextlib.suppress(IndexError):
         (_change_structure if kind in _STRUCTURE else _change_elements)(rng, kind, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")

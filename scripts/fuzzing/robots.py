@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Robots of the family "everything" have several random kinds of unusual content.
+#: "everything" combines several kinds of unusual content.
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
@@ -33,7 +33,7 @@ _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
 #: XML elements that other programs add to URDF files. A namespace prefix replaces `{p}`.
-#: A URDF reader must not read links, joints or mimic rules from these elements.
+#: Readers must ignore links, joints and mimic rules in these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -53,7 +53,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def format_number(rng: random.Random, x: float) -> str:
-    """Return a number as text in a random notation. Some notations round the number."""
+    """Return a random notation, which may round the number."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -69,9 +69,9 @@ def usual_length(rng: random.Random) -> float:
 
 
 def odd_length(rng: random.Random) -> float:
-    """Return a random length, positive or negative, with an absolute value from about 1e-320 to 1e301.
+    """Return a length of random magnitude and sign.
 
-    The absolute value is small enough that a sum of several random lengths usually does not overflow.
+    The sum of several such lengths usually does not overflow.
     """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
@@ -83,7 +83,6 @@ def usual_angle(rng: random.Random) -> float:
 
 
 def odd_angle(rng: random.Random) -> float:
-    """Return an angle (rad) that is up to 1e15, tiny, or nearly a multiple of a quarter turn."""
     near = rng.choice(_TURNS) + rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18, -3)
     large = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(0, 15)
     return rng.choice((near, large, 10.0 ** rng.uniform(-320, 0), rng.uniform(-9.0, 9.0), 90.0, 180.0))
@@ -99,7 +98,6 @@ def draw_direction(rng: random.Random) -> list[float]:
 
 
 def odd_axis(rng: random.Random) -> list[float]:
-    """Return an axis of unusual length, or an axis that is nearly along a coordinate axis."""
     axis = draw_direction(rng)
     if rng.random() < 0.5:
         tilt = 10.0 ** rng.uniform(-20, -3)
@@ -123,7 +121,6 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return a norm that is mostly about 1, and sometimes extremely small or large."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
@@ -134,7 +131,7 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return random limits of a joint: equal, adjacent, far apart or, rarely, reversed."""
+    """Return limits of a joint, rarely reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:
@@ -210,7 +207,7 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Most random robots are chains, because a chain accumulates the largest rounding errors.
+        # Chains accumulate the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
@@ -235,7 +232,6 @@ class _RandomRobot:
         return rng.choice((f"<origin{xyz}{rpy}/>",) * 4 + (f"<origin{rpy}/>", f"<origin{xyz}/>", ""))
 
     def axis(self, kind: str) -> str:
-        """Return the joint's axis; a planar joint has z, as in urdfkin and Pinocchio."""
         if kind == "planar":
             return '<axis xyz="0 0 1"/>'
         if kind in ("fixed", "floating"):
@@ -246,7 +242,7 @@ class _RandomRobot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # From URDF version 1.2 on, limits apply to all kinds of joints.
+        # From URDF 1.2 on, limits apply to all joints.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):
@@ -270,7 +266,7 @@ class _RandomRobot:
         rng = self.rng
         if "mimic" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # A mimic joint mimics only a joint with a lower number, so there is no cycle.
+        # A mimic joint mimics only joints with lower numbers.
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not independent_joints:
             return ""

@@ -27,13 +27,15 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant: a new value for an element of a list or for a field of a syntax node.
+    """One mutant: a new value in the syntax tree.
 
-    If an element of a list changes, `container` is the list, and `key` is the index of the element. If a
-    field of a syntax node changes, `container` is the node, and `key` is the name of the field.
+    | change | `container` | `key` |
+    |---|---|---|
+    | element of a list | the list | index of the element |
+    | field of a node | the node | name of the field |
     """
 
-    node: ast.AST  # The description of the mutant quotes the text of this node.
+    node: ast.AST  # The mutant's description quotes this node.
     container: Any
     key: int | str
     value: Any
@@ -51,9 +53,10 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Change the tree in place, and restore it at the end of the `with` block.
+        """Change the tree inside a `with` block.
 
-        The context manager yields the value that was replaced.
+        Yields:
+            The replaced value.
         """
         old = self.put(self.value)
         try:
@@ -71,7 +74,10 @@ class Change:
 
 
 def list_changes(tree: ast.Module) -> list[Change]:
-    """Return all mutants of a file in a fixed order. Applying a mutant changes the given tree."""
+    """Return all mutants of a file.
+
+    Applying a mutant changes the given tree.
+    """
     return [
         change
         for node in _executed_nodes(tree)
@@ -93,16 +99,15 @@ def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDe
 
 
 def function_at(tree: ast.Module, line: int) -> str:
-    """Return the function or class around a line, such as `Tally.percentile`, or "" if there is none."""
+    """Return the function around a line, or ""."""
     return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
 def replace_code(source: str, function: str, before: str, after: str) -> ast.Module:
-    """Replace a piece of code in one function of a file, and return the syntax tree of the changed file.
+    """Replace a piece of code in one function.
 
-    `function` names a function, a class or a method, such as `Tally.percentile`; "" is the whole file.
-    `before` and `after` are expressions, keyword arguments, or statements. Line breaks, brackets and comments
-    do not matter. Raise ValueError if the function does not contain `before`, or contains it several times.
+    `function` names a function or a class; "" is the whole file.
+    The function must contain `before` exactly once.
     """
     tree = ast.parse(source)
     alternatives = [[ast.unparse(node) for node in nodes] for nodes in _parse_alternatives(before)]
@@ -136,11 +141,7 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
-    """Parse a piece of code, whose kind is unknown, into syntax nodes.
-
-    If the code is an expression, the result contains only the expression. Other code can be statements,
-    keyword arguments, or both; the result contains each possible interpretation.
-    """
+    """Return each possible interpretation of a piece of code."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:
@@ -152,7 +153,6 @@ def _parse_alternatives(code: str) -> list[list[ast.AST]]:
 
 
 def _parse_as(code: str, kind: type) -> list[ast.AST]:
-    """Parse code into nodes of one kind: expressions, statements or keyword arguments."""
     if issubclass(kind, ast.stmt):
         return [*ast.parse(code).body]
     if issubclass(kind, ast.expr):
@@ -162,11 +162,7 @@ def _parse_as(code: str, kind: type) -> list[ast.AST]:
 
 
 def _executed_nodes(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a syntax tree that can have mutants.
-
-    The function omits annotations, type parameters, decorators, format specifications, `__all__`, and blocks
-    that begin with `if TYPE_CHECKING`.
-    """
+    """Yield the nodes that can have mutants."""
     yield node
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list", "format_spec", "type_params"):
@@ -229,7 +225,7 @@ def _other_value(value: bool | int | float) -> bool | int | float:
 
 
 def _concerns_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Return whether an operand is written as a string or as None, as in `"a" + b` or `int | None`."""
+    """Return whether an operand is a string or None."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

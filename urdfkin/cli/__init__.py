@@ -23,7 +23,7 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
+#: Commands of each heading, with their modules and summaries.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
@@ -109,8 +109,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Suggestions for a word that is not a command, for example `placement` for the word "fk".
-#: Each key is the suggested command, and its value lists the words.
+#: Suggested commands for other words, for example `placement` for "fk".
 _SYNONYMS = _by_word(
     {
         "--help": "help usage man",
@@ -139,8 +138,7 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice for a user who types the name of a computation that no command performs, for example "ik".
-#: Each key is the advice that urdfkin prints, and its value lists the words.
+#: Advice for computations that urdfkin lacks, for example "ik".
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm. For an"
@@ -248,6 +246,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The last line of the output already states what is not verified, so this warning is hidden.
+    # The last line of the output already states this warning.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -145,7 +145,7 @@ def calibrate_command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # The JSON function returns a text, because `Answer` would add an entry `check` to a mapping.
+        # For a mapping, `Answer` would add an entry `check`.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 
@@ -218,7 +218,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        # The ignored warnings were already shown when the robot was loaded.
+        # These warnings were shown when the robot was loaded.
         warnings.simplefilter("ignore")
         return fit_model(
             source,

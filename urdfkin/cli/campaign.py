@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Minimum time (s) between two lines about the progress.
-#: `_LINE_INTERVAL` is for lines of text, and `_JSON_INTERVAL` is for lines of JSON.
+#: Intervals for lines of text and for lines of JSON, s.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
 
@@ -43,7 +43,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # The time before the first new result is not counted, because urdfkin may compile kernels then.
+        # urdfkin may compile kernels before the first new result.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:
@@ -150,7 +150,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 
 _MAX_FAILED = 20
-#: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
+#: Maximum number of chunks that `status` reads for its estimate
 _MAX_CHUNKS = 200
 
 

@@ -160,7 +160,7 @@ def _report_fixes(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings in pyproject.toml that are defaults of the options with the same names
+#: Settings in pyproject.toml that replace the defaults of options
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 
 

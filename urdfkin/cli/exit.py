@@ -46,8 +46,8 @@ def handle_signals() -> Iterator[Stop]:
     """
     stop = Stop()
     # `nohup` makes a process ignore SIGHUP.
-    # A handler of urdfkin would replace this setting, so that SIGHUP would stop the process.
-    # urdfkin therefore sets a handler only for signals that still have the default handler.
+    # Under nohup, SIGHUP must stay ignored.
+    # urdfkin therefore replaces only default handlers.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:
@@ -79,7 +79,7 @@ def run(command: click.Command, name: str) -> int:
     defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
-        # In standalone mode, click would exit with 1 after an interrupt.
+        # In standalone mode, click would return 1 after an interrupt.
         try:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:
@@ -115,7 +115,7 @@ def _report_usage_error(error: click.ClickException) -> int:
 
 def report_crash(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # A dependency can be missing, for example if pre-commit installed urdfkin with --no-deps.
+        # For example, pre-commit may install urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
         click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2

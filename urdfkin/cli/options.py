@@ -102,7 +102,7 @@ def reject_unused_options(context: click.Context, unused: Collection[str], becau
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples that an option with the value `random` draws, for example `--q random`.
+#: Number of samples of the value `random`.
 #: With the value `random:N`, the option draws N samples.
 _RANDOM_SAMPLES = 1
 
@@ -398,7 +398,7 @@ class Inputs:
         return replace(self, settings={**self.settings, **more})
 
 
-#: The family of the findings about masses, shapes and colours. `check` reports them.
+#: The family of findings about masses, shapes and colours.
 _NOT_KINEMATICS = "URDF7"
 
 

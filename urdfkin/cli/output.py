@@ -38,7 +38,7 @@ _SUFFIXES = {
 }  # fmt: skip
 _F = TypeVar("_F", bound=Callable[..., Any])
 #: Maximum number of characters in a line of a table.
-#: Without this limit, one very long name could fill the memory: all cells of a column have the same width.
+#: All cells of a column have the width of the longest cell.
 _MAX_WIDTH = 10_000
 
 
@@ -190,7 +190,7 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            # `write_file` writes to a device or a pipe directly, without a temporary file.
+            # Devices and pipes are written directly.
             if path.exists() and not path.is_file():
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):

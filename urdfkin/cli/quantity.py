@@ -238,7 +238,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
-        # The CSV of a Hessian has one line for each entry of the Jacobian, with the entry's derivatives.
+        # In CSV, each line is one entry of the Jacobian.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -256,7 +256,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
 
 
 #: Headings of the first column of CSV output.
-#: The heading is "sample" if the samples have no times, and "t" if the samples have times.
+#: The heading is "t" for samples with times.
 _TIME = ("sample", "t")
 
 

@@ -67,7 +67,7 @@ def _as_dict(entry: CatalogueEntry) -> dict[str, object]:
     }
 
 
-#: The import of this function is slow, and only JSON output needs the function.
+#: Only JSON output needs this slow import.
 _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 

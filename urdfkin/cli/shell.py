@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
 #: Pattern of the names that completion offers.
-#: A shell does not interpret any character of these names.
-#: A name with a colon does not match, because bash separates words at colons.
+#: Names without characters that a shell interprets.
+#: Bash separates words at colons, so colons do not match.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a file from which shell completion reads frame names
+#: Maximum size of a file for shell completion, bytes
 _MOST_BYTES = 10_000_000
-#: XML elements that define frames. In a URDF, only children of the root element define frames.
+#: XML elements that define frames; in a URDF, children of the root.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -42,8 +42,8 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    # While the user types the value of an option, click has not parsed ROBOT yet.
-    # In this case, the first argument of the command is taken as ROBOT.
+    # During completion of an option, click has not parsed ROBOT.
+    # The first argument then counts as ROBOT.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 
@@ -115,7 +115,7 @@ def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fi
       urdfkin completion bash
     """  # noqa: D301  "\b" is one character for click; in a raw string, it would be two
     script = get_completion_class(shell)
-    # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
+    # The variable _URDFKIN_COMPLETE makes click print completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())
 
 

@@ -34,7 +34,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about joint values that look like degrees.
+    # Commands print their own line about degrees.
     # Therefore, DegreesWarning is hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
@@ -116,11 +116,11 @@ def _show_warning(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Escape sequences that the package rich writes for colours and for progress bars
+#: Escape sequences of rich for colours and progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum number of characters of an unfinished line that a `SafeStream` stores completely.
+#: Maximum number of stored characters of an unfinished line.
 #: A longer line is stored only in part.
-#: A line is stored because the next piece of text may complete a CI command that begins in the line.
+#: The next text may complete a CI command in this line.
 _MAX_STORED = 64
 
 
@@ -140,7 +140,7 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        # Text and escape sequences alternate; only the text is escaped.
+        # Only the text between escape sequences is escaped.
         pieces[::2] = [self._without_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
@@ -188,8 +188,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, only the last 16 characters are stored, with an additional "x" in front.
-        # Without the "x", these characters could look like a CI command at the beginning of a line.
+        # Only the last 16 characters of a long line are stored.
+        # The "x" in front prevents a CI command at the line's beginning.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (
@@ -213,7 +213,7 @@ def wrap_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # If the encoding is not UTF-8, click would write to the wrapped stream directly, without escapes.
+            # For encodings other than UTF-8, click would bypass this stream.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 

@@ -108,7 +108,7 @@ def view_command(
         Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        # Python buffers output to a pipe, so without a flush the reader gets the address late.
+        # Without a flush, a reader of a pipe gets the address late.
         sys.stdout.flush()
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
         with open_page(server.address) if opens else nullcontext():

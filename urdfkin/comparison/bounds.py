@@ -42,19 +42,18 @@ from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
 RANDOM_SAMPLES = 512
-#: Number of random configurations at corners of the joint ranges.
-#: At a corner, each variable is equal to the lower or the upper end of its range.
+#: Number of random configurations at ends of the joint ranges.
 CORNER_SAMPLES = 128
-#: For each frame, the search for the largest distance starts at this number of sampled configurations.
+#: Number of sampled configurations at which a search starts.
 STARTING_POINTS = 4
-#: Number of values that one step of the search tries for one coordinate.
+#: Number of values per coordinate in one step of the search.
 VALUES_PER_STEP = 13
 #: Number of frames that are searched in one batch.
 FRAMES_PER_BATCH = 24
-#: Width of the search interval in each round, as a fraction of the coordinate's range.
+#: Width of the search interval in each round, relative to the range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
-#: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
+#: Function that returns the poses (n, frames, 4, 4) at q.
 PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
@@ -79,14 +78,14 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: Pose (4, 4) of B's base link in A's root frame, while A is in its zero configuration.
+        #: (4, 4) pose of B's base link in A's root frame at zero.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: For A and for B: whether the base link and the root link belong to the same rigid body.
+        #: Whether base link and root link are one rigid body, for A and B.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether a moving joint between a robot's root and its base link changes the distances.
-        #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
+        #: Whether a joint between root and base link changes the distances.
+        #: The bounds of `upper_bounds` and `tighten` do not hold then.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -278,9 +277,9 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 
 
 #: Maximum number of boxes in memory.
-#: With this number of boxes, `tighten` takes one or two seconds to compute a bound for one frame.
+#: With this number of boxes, `tighten` takes one or two seconds.
 MAX_BOXES = 2**17
-#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
+#: Boxes per batch; more Jacobians would take gigabytes.
 BOXES_PER_BATCH = 2**16
 
 
@@ -301,7 +300,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: For each robot, derivatives (nv, variables) of its joint values with respect to the variables.
+        #: (nv, variables) derivatives of each robot's joint values.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -360,8 +359,8 @@ def tighten(
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
-    # An unlimited revolute joint repeats its poses after one turn.
-    # The unlimited range of any other joint cannot be divided into boxes.
+    # Unlimited revolute joints repeat their poses after one turn.
+    # Other unlimited ranges cannot be divided into boxes.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)

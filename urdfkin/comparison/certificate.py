@@ -30,15 +30,15 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, as_json_data, doc, of_length
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
-#: Maximum number of boxes in memory during the branch and bound of `recheck`.
+#: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
-#: The tolerances allow for different rounding errors on the machine that wrote the certificate.
+#: Relative tolerance, and absolute tolerance near zero (m or rad).
+#: Other machines may have other rounding errors.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
-#: The relative tolerance of a bound is this number times the machine epsilon.
+#: Relative tolerance of a bound, in machine epsilons.
 _BOUND_TOLERANCE = 64.0
 #: Entries of a certificate that follow from the two models.
-#: `recheck` computes these entries again, and compares the results with the certificate.
+#: `recheck` computes these entries again, and compares them.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -240,7 +240,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
 
 
 #: Attributes of `Sameness` that the certificate contains.
-#: The entries of the certificate have the names of the attributes.
+#: Entries and attributes have the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",

@@ -36,14 +36,14 @@ from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
+#: Default joint attributes: every joint, joints with an axis, mimic joints.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
-#: `diff` uses these values if the two versions have different formats.
+#: `diff` uses them if the versions have different formats.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -218,7 +218,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
             single = SINGLE_ROUNDOFF if result.single else 0.0
             for one in limit_differences(a, b, result.rounding[1], single):
                 yield from _change_of(one)
-    # The readers of MJCF and USD add the link "world" as the root.
+    # Readers of MJCF and USD add the root link "world".
     roots = [tree.links[0] for tree, name in zip(result.trees, formats, strict=True) if name != "URDF"]
     for one in result.remarks:
         if one.what in ("idle", "only in A", "only in B"):

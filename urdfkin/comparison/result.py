@@ -37,10 +37,10 @@ from urdfkin.system.lazy_import import get_hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: A length or angle of at least 0.9 m or 0.9 rad is written without a unit prefix.
-#: A smaller value is written in the largest prefixed unit that makes the number at least 0.1.
+#: Values from 0.9 m or 0.9 rad have no unit prefix.
+#: Smaller values use the largest prefix for a number from 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
-#: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
+#: Both limits are slightly lower, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -57,10 +57,10 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes of B. The models are equivalent if changes of these kinds make B equal to A.
+#: Changes of B that keep the models equivalent.
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences for which the distance between matching frames has an upper bound.
+#: Differences for which frame distances have an upper bound.
 BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
@@ -106,11 +106,11 @@ class Interval:
 
 
 #: Value of a parameter of a joint or link.
-#: A str is a type or a name, and a float is a limit of velocity or effort.
-#: For "limits", a tuple contains the lower and the upper limit.
-#: For "idle", a tuple contains the type of a joint that never moves, and the joint's value (rad or m).
-#: For "only in A" and "only in B", a tuple contains the names of links.
-#: A `Mimic` is a mimic rule; None means that the parameter has no value.
+#: str: type or name. float: limit of velocity or effort.
+#: tuple for "limits": lower and upper limit.
+#: tuple for "idle": type and value (rad or m) of a fixed joint.
+#: tuple for "only in A" and "only in B": names of links.
+#: `Mimic`: mimic rule. None: no value.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -259,7 +259,7 @@ class Tool:
 
 #: Result of Pinocchio's check of the bounds.
 #: "not asked" means that the user requested no check.
-#: "not verified" means that Pinocchio could not check the bounds.
+#: "not verified": Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
@@ -588,7 +588,7 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        # The constructor raises an error if B has no coordinate for a joint of A.
+        # The constructor needs a coordinate of B for each joint of A.
         Conversion(tree_a, "", found)
         return found
 
@@ -705,7 +705,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
-                continue  # The line about the base pose already describes this difference.
+                continue  # The line about the base pose describes this difference.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -780,8 +780,8 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    # `same` can replace a mimic joint with the multiplier 0 by a fixed joint.
-    # The child link of this fixed joint is not treated as a tool.
+    # A mimic joint with the multiplier 0 may be a fixed joint here.
+    # The child link of such a joint is no tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
             return False
@@ -886,8 +886,8 @@ def remarks(
         for lock in filter(None, map(is_idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
-    # A joint can be a mimic joint in A and independent in B, although all joint values agree.
-    # For example, the mimic rule in B can be the inverse of the mimic rule in A.
+    # A mimic joint of A can be independent in B,
+    # for example if B has the inverse mimic rule.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.coordinates.get(b.name)

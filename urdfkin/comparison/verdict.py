@@ -59,14 +59,14 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
-#: Number of random configurations at which Pinocchio checks the distances between matching frames.
+#: Random configurations at which Pinocchio checks distances.
 CONFIRMATION_SAMPLES = 8
-#: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
-#: The search for the largest distance between the unchanged models uses at most this number of frames.
+#: Maximum number of frames with a bound on the finer grid.
+#: Also the maximum number of frames in the search for the largest distance.
 MAX_FARTHEST_FRAMES = 4
-#: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
+#: Maximum path length, m; squares of longer lengths overflow.
 MAX_PATH_LENGTH = 1e150
-#: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
+#: Branch and bound ends at this ratio of bound to largest distance.
 SHARP_FACTOR = 1.05
 
 
@@ -122,7 +122,7 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # The comparison stores compiled trees in the robots, so `same` passes copies of the user's robots.
+    # `same` stores compiled trees in copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -305,8 +305,8 @@ class Comparator:
     def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
-        # Therefore, a comparison with a table uses only links with equal names in A and B.
+        # Frames of a Denavit-Hartenberg table depend on its convention.
+        # Only links with equal names are therefore compared.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -419,8 +419,8 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If all positions agree up to rounding, only one frame is searched.
-        # This frame has the largest upper bound on the angle.
+        # If all positions agree, only one frame is searched:
+        # the frame with the largest bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -693,7 +693,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in alignment.frames}
         self.steps = {step.a: step for step in alignment.steps}
         root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
-        #: The link of A and the link of B at which the compared paths begin.
+        #: Links of A and B at which the paths begin.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -749,8 +749,8 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # P and the link have a last common ancestor in B.
-        # The list `paths[1][0]` contains the joints from this ancestor to P.
+        # P and the link have a last common ancestor in B;
+        # `paths[1][0]` contains the joints from there to P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -772,7 +772,7 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A shifted link origin also shifts the axis, so the axes are compared in the link's frame.
+            # A shifted link origin also shifts the axis in the parent's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(

@@ -40,7 +40,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Kinds of acceleration that a joint contributes, in the order of `AccelerationBreakdown.terms`.
+#: Kinds of acceleration of a joint, in the order of `terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 _MAX_DISPLAYED = 2
 
@@ -49,12 +49,12 @@ _MAX_DISPLAYED = 2
 class AccelerationBreakdown(Displayable):
     """Contributions of the joints to a frame's acceleration.
 
+    Six numbers are [linear; angular], m/s^2 and rad/s^2.
+
     Attributes:
-        joints: Names of the moving joints from the base to the frame.
-        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
-            moved.
-        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of
-            `ACCELERATION_KINDS`, and the six numbers are [linear; angular].
+        joints: Moving joints from the base to the frame.
+        base: (..., 6) acceleration of the frame if all joints were fixed.
+        terms: (..., joints, 4, 6) contributions; `ACCELERATION_KINDS` names the four kinds.
     """
 
     joints: tuple[str, ...]
@@ -65,7 +65,7 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """Yield (joint, kind, six numbers) for each nonzero contribution of one sample."""
+        """Yield (joint, kind, six numbers) for each nonzero contribution."""
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):
@@ -87,7 +87,7 @@ class AccelerationBreakdown(Displayable):
 
     @cached_property
     def total(self) -> FloatArray:
-        """The acceleration (..., 6): the sum of the base's and all joints' contributions."""
+        """The frame's acceleration (..., 6)."""
         total: FloatArray = self.base + self.by_joint.sum(axis=-2)
         return total
 
@@ -99,13 +99,13 @@ class AccelerationBreakdown(Displayable):
 
     @cached_property
     def by_kind(self) -> FloatArray:
-        """The contribution of each kind (..., 4, 6), summed over the joints."""
+        """The joints' contributions of each kind (..., 4, 6)."""
         total: FloatArray = self.terms.sum(axis=-3)
         return total
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
+    """Velocity or acceleration of a joint, in world axes."""
 
     linear: FloatArray
     angular: FloatArray
@@ -123,11 +123,10 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """Split the classical acceleration of a link's frame into contributions, for n configurations.
+    """Split the classical acceleration of a link's frame.
 
-    `base` is the state of the base: an array (1, 24) for all configurations, or an array (n, 24).
-    `BaseMotion.state` defines the 24 numbers. If `out` is given, the contributions of the joints are written
-    to this array (n, joints, 4, 6).
+    `base` has the shape (n, 24) or (1, 24); see `BaseMotion.state`.
+    `out` has the shape (n, joints, 4, 6).
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
@@ -169,7 +168,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Write the joints' contributions to `terms`, and return the base's contribution."""
+    """Write `terms`; return the base's acceleration."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -194,10 +193,7 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return the vector from the origin of each link on the path to the origin of the last link.
-
-    The vectors (n, links, 3) are in world axes.
-    """
+    """Return the vectors to the last link, in world axes."""
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -210,7 +206,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's translation (n, 3) in the joint's axes."""
+    """Return a joint's translation in the joint's axes."""
     translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -230,7 +226,7 @@ def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
 def _joint_terms(
     rate: _RelativeMotion, rate_2: _RelativeMotion, w_before: FloatArray, d: FloatArray
 ) -> FloatArray:
-    """Return the contributions (n, 4, 6) of one joint, in the order of `ACCELERATION_KINDS`."""
+    """Return the terms in the order of `ACCELERATION_KINDS`."""
     nothing = np.zeros_like(d)
     u = eq.point_velocity(rate.linear, rate.angular, d)
     kinds = (
@@ -260,7 +256,10 @@ def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMot
 
 
 def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration (7.123) of a point fixed to the base, at `d` from the base's origin."""
+    """Return the acceleration at `d` (7.123).
+
+    `d` begins at the base's origin.
+    """
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

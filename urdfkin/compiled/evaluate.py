@@ -4,6 +4,16 @@ Inputs have the shapes (n, nq) and (n, nv). `urdfkin.robot` checks the shapes; t
 not. Small batches are computed with Python numbers, and large batches by a compiled kernel. The module
 `preload` decides when a kernel is used. Results are exactly the same doubles for each method and for any
 number of threads.
+
+| function | result | shape | equations |
+|---|---|---|---|
+| `placements` | T_world_frame | (n, frames, 4, 4) | 7.77 |
+| `velocities` | [linear; angular] | (n, frames, 6) | 7.127, 7.128 |
+| `accelerations` | classical [linear; angular] | (n, frames, 6) | 7.129, 7.130 |
+| `jacobians` | Jacobian | (n, frames, 6, nv) | 7.85 |
+| `jacobian_rates` | time derivative of the Jacobian | (n, frames, 6, nv) | 7.126 |
+| `hessians` | [..., i, j]: derivative of column i for joint velocity j | (n, frames, 6, nv, nv) | |
+| `imus` | [proper acceleration; angular velocity], in frame axes | (n, frames, 6) | |
 """
 
 from __future__ import annotations
@@ -41,10 +51,10 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results of at least this many bytes do not fit into the caches and are written directly to memory.
+#: Larger results (bytes) are written directly to memory, past the caches.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
-#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
+#: 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_SIZE = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -53,9 +63,10 @@ _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V,
 class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
-    `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous float64 array of the
-    result's size. `keep_in_cache` is true if the caller reads the results immediately, so that the results
-    stay in the caches.
+    Attributes:
+        base: State of the base, (n, 24) or (1, 24).
+        out: C-contiguous float64 array for the result.
+        keep_in_cache: Whether the caller reads the results immediately.
     """
 
     base: FloatArray
@@ -65,7 +76,6 @@ class EvaluateOptions(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **options: Unpack[EvaluateOptions]) -> FloatArray:
-    """Return T_world_frame (n, frames, 4, 4); equation 7.77 gives the positions."""
     program = compile_program(plan, orientations=True)
     return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **options)
 
@@ -77,7 +87,6 @@ def velocities(
     reference: Reference = _ALIGNED,
     **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
-    """Return velocities (n, frames, 6), [linear; angular], by equations 7.127 and 7.128."""
     local = reference.own_axes
     name = "local_velocities" if local else "velocities"
     return _compute(name, plan, compile_program(plan, orientations=local), [q, v], reference, (6,), **options)
@@ -91,7 +100,6 @@ def accelerations(
     reference: Reference = _ALIGNED,
     **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
-    """Return classical accelerations (n, frames, 6), [linear; angular], by equations 7.129 and 7.130."""
     local = reference.own_axes
     name = "local_accelerations" if local else "accelerations"
     return _compute(
@@ -102,7 +110,6 @@ def accelerations(
 def jacobians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **options: Unpack[EvaluateOptions]
 ) -> FloatArray:
-    """Return Jacobians (n, frames, 6, nv) by equation 7.85."""
     program = compile_program(plan, orientations=reference.own_axes, columns=True)
     return _compute("jacobians", plan, program, [q], reference, (6, plan.nv), **options)
 
@@ -114,7 +121,6 @@ def jacobian_rates(
     reference: Reference = _ALIGNED,
     **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
-    """Return time derivatives J-dot of Jacobians (n, frames, 6, nv) by equation 7.126."""
     program = compile_program(plan, orientations=reference.own_axes, columns=True)
     return _compute("jacobian_rates", plan, program, [q, v], reference, (6, plan.nv), **options)
 
@@ -122,10 +128,6 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **options: Unpack[EvaluateOptions]
 ) -> FloatArray:
-    """Return Hessians (n, frames, 6, nv, nv).
-
-    Entry [..., i, j] is the derivative of Jacobian column i in the direction of the joint velocity j.
-    """
     program = compile_program(plan, orientations=reference.own_axes, columns=True, hessian=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **options)
 
@@ -139,7 +141,6 @@ def imus(
     gravity: FloatArray,
     **options: Unpack[EvaluateOptions],
 ) -> FloatArray:
-    """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes."""
     options["base"] = subtract_gravity(options.get("base", FIXED_BASE_STATE), gravity)
     program = compile_program(plan, orientations=True)
     return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **options)
@@ -158,10 +159,9 @@ def _compute(
     threads: int | None = None,
     keep_in_cache: bool = False,
 ) -> FloatArray:
-    """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a."""
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    # In an array with the stride 0, all rows are the same row of memory.
+    # With the stride 0, all rows are one row of memory.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (invalid := _compute_interpreted(name, program, reference, inputs, out, threads)) is None:
         invalid = _compute_compiled(
@@ -180,10 +180,10 @@ def _compute_interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch with Python numbers, without a kernel.
+    """Compute a batch with Python numbers.
 
-    The result is None if `preload` provides a kernel before the batch is complete. For a complete batch, the
-    result is 1 if an input is nan, infinite or too large, else 0.
+    Returns:
+        None if a kernel becomes available; 1 for invalid inputs, else 0.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -197,7 +197,7 @@ def _compute_interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.add_time(name, took)
-        # The first configuration takes longer than later configurations, so its time is not representative.
+        # The first configuration takes longer than the others.
         if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least) is not None:
             return None
     return invalid
@@ -240,7 +240,6 @@ def _compute_compiled(
 
 
 def uses_buffer(out: FloatArray) -> bool:
-    """Return whether results are collected in a buffer and then written in whole cache lines."""
     return out.nbytes >= _MIN_BUFFERED_BYTES and LANES * out[0].size <= _MAX_BUFFER_SIZE
 
 
@@ -252,7 +251,10 @@ def make_kernel_args(
     *,
     buffered: bool,
 ) -> tuple[NDArray[np.int64], object]:
-    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished."""
+    """Return a kernel's arguments and memory.
+
+    The memory must stay alive until the kernel has finished.
+    """
     width, memory, args = out[0].size, make_scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     buffer = aligned_empty(LANES * width if buffered else 0)
     args[KernelArgs.PROGRAM], args[KernelArgs.CONSTANTS] = program.addresses
@@ -283,14 +285,14 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Smaller batches use one thread, because starting a thread takes about ten microseconds.
+#: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
+#: Number of configurations per block, to fit into the cache.
 ROWS_PER_PART = 2048
 
-#: A function that computes the rows of the argument `out` from the rows of the argument `inputs`.
-#: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
+#: A function that computes rows of `out` from rows of `inputs`.
+#: It returns 1 for nan, inf or too large inputs, else 0.
 BlockFunction = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
@@ -307,10 +309,10 @@ def _processors() -> int:
 def compute_in_blocks(
     compute: BlockFunction, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
 ) -> int:
-    """Compute `out` (n, ...) in several threads.
+    """Compute `out` in several threads.
 
-    Each array of `inputs` is (n, ...) or (1, ...). All arrays are C-contiguous, and `compute` must release
-    Python's global interpreter lock. The result is 1 if an input is nan, infinite or too large, else 0.
+    All arrays must be C-contiguous.
+    `compute` must release Python's global interpreter lock.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
@@ -328,9 +330,9 @@ def compute_in_blocks(
 
 
 def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n.
+    """Compute `n` rows in parts to limit memory.
 
-    If n is 0, `compute` is called once, with an empty slice.
+    If n is 0, `compute` gets an empty slice.
     """
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)
     parts = [slice(i, min(i + ROWS_PER_PART, n)) for i in range(0, max(n, 1), ROWS_PER_PART)]
@@ -344,7 +346,7 @@ def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | No
     if len(parts_by_thread) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, thread_parts) for thread_parts in parts_by_thread]
-    wait(work)  # An error is raised only after all threads have finished writing.
+    wait(work)  # All threads must finish writing first.
     for future in work:
         future.result()
     return None

@@ -18,20 +18,19 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
-#: Lock that a thread holds while it imports Numba or compiles a kernel.
-#: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
-#: Before a fork, Python acquires the locks in the reverse order of their creation.
-#: The import of Numba acquires this lock first and then `logging`'s lock.
-#: A fork must acquire both locks in the same order, so `logging`'s lock must be created before this lock.
+#: Lock for the import of Numba and for compilations.
+#: A fork waits for it, because a child cannot finish the parent's compilation.
+#: A fork acquires locks in the reverse order of their creation.
+#: The import of Numba acquires this lock before `logging`'s lock.
+#: `logging`'s lock must therefore be created before this lock.
 compile_lock = make_fork_safe_lock()
 
-#: A function with two arguments: a kernel's name, and the duration (s) of the kernel's compilation.
+#: A function of a kernel's name and its compile time, s.
 #: When the compilation begins, the second argument is None.
 Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log a warning about the first compilation of this process."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -55,10 +54,9 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Inform the listener when the compilation of a kernel begins and ends.
+    """Report a compilation to the listener.
 
-    The context yields a function. The caller must call this function immediately before the compilation. If
-    the kernel is loaded from disk, the caller does not call the function, and the listener is not informed.
+    The caller must call the yielded function immediately before the compilation.
     """
     starts: list[float] = []
 
@@ -73,7 +71,7 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 
 @cache
 def kernel_cache_folder() -> Path | None:
-    """Return the cache folder of compiled kernels; None if no folder is writable."""
+    """Return None if no folder is writable."""
     with import_lock:
         from urdfkin.system.cache import make_cache_folder
 

@@ -24,8 +24,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: `_POSE_ROWS` lists the rows of scratch memory that contain the 16 elements of a pose.
-#: `_SIX_ROWS` lists the rows that contain the six numbers of a velocity or an acceleration.
+#: Scratch rows of the 16 elements of a pose.
+#: Scratch rows of the six numbers of a velocity or acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -46,7 +46,7 @@ def mask_for_velocity(state):
 
 
 def mask_for_acceleration(state):
-    """Mark the linear velocity as unused, because acceleration (7.130) does not depend on this velocity."""
+    """Mark the linear velocity as unused (7.130)."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -74,7 +74,7 @@ def _store_pose_row(s, row, x, last):
 def write_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:
-        # The result is the velocity of the body point that is now at the world's origin.
+        # Velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
     _write_six_vector(m, s, program, place, b, vel, w, to)
 
@@ -87,9 +87,9 @@ def write_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 
 def write_imu(m, s, program, place, sources, b, reference, state, to):
-    """Write the readings of an accelerometer and a gyroscope.
+    """Write accelerometer and gyroscope readings.
 
-    The caller has subtracted gravity from the base's acceleration.
+    The base's acceleration must already exclude gravity.
     """
     _write_six_vector(m, s, program, place, b, state[5], state[2], to)
 
@@ -110,14 +110,14 @@ def write_matrix(m, s, program, place, sources, b, reference, state, to):
 
 
 def store_no_axis(s, row, axis, state):
-    """Do nothing, because this output has no Jacobian columns."""
+    """Do nothing."""
 
 
 def write_no_column(s, row, to, flags, g, c, reference, state): ...
 
 
 def store_axis(s, row, axis, state):
-    """Store a joint's axis z_{i-1} and origin O_{i-1} in world axes (7.85)."""
+    """Store a joint's axis and origin (7.85)."""
     R, p = state[0], state[1]
     if axis == 2:
         store_vector(s, row, (R[0][2], R[1][2], R[2][2]))
@@ -135,7 +135,7 @@ def store_moving_axis(s, row, axis, state):
 
 
 def write_jacobian_column(s, row, to, flags, g, c, reference, state):
-    """Compute a Jacobian column: [z x d_{i-1,n}; z] (revolute) or [z; 0] (prismatic), eq. 7.85."""
+    """Compute a Jacobian column (7.85)."""
     z, R = load_vector(s, row), state[0]
     if flags & 1:
         d = eq.minus(_reference_point(reference, state[1]), load_vector(s, row + 3))
@@ -146,10 +146,7 @@ def write_jacobian_column(s, row, to, flags, g, c, reference, state):
 
 
 def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126).
-
-    For LOCAL, differentiate the column's components in the moving axes of the frame.
-    """
+    """Differentiate a Jacobian column (7.126)."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = load_vector(s, row)
     z_rate = eq.axis_rate(load_vector(s, row + 6), z)
@@ -169,11 +166,7 @@ def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
 
 
 def _reference_point(reference, x):
-    """Return the position or the velocity of the point to which a Jacobian refers.
-
-    `x` is the position or the velocity of the frame's origin. In the reference frame WORLD, the Jacobian
-    refers to the world's origin, so the result is 0.
-    """
+    """Return the reference point's position or velocity."""
     if reference == _WORLD:
         nil = broadcast(0.0)
         x = nil, nil, nil
@@ -181,10 +174,6 @@ def _reference_point(reference, x):
 
 
 def _write_column(s, to, flags, g, c, reference, R, linear, angular):
-    """Write a Jacobian column in the axes of the reference frame.
-
-    The column of a mimic joint is scaled and added to the column of the mimicked joint.
-    """
     if reference == _LOCAL:
         back = eq.transposed(R)
         linear, angular = eq.rotate(back, linear), eq.rotate(back, angular)
@@ -212,7 +201,6 @@ def _add_six_vector(s, to, linear, angular):
 
 
 def write_hessian(m, s, program, place, pairs, b, reference, state, to):
-    """Write the Hessian (6, nv, nv) of a frame."""
     count, nv = program[pairs], program[_NV]
     first, end = pairs + 1, pairs + 1 + HESSIAN_COLUMN_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
@@ -222,7 +210,7 @@ def write_hessian(m, s, program, place, pairs, b, reference, state, to):
             store_vector(s, program[j + 3], _zero_vector())
             store_vector(s, program[j + 3] + 3, _zero_vector())
         for i in range(first, end, HESSIAN_COLUMN_WIDTH):
-            if program[i + 2] == rate:  # Mimic joints have the same velocity index as the mimicked joint.
+            if program[i + 2] == rate:  # Mimic joints have the velocity index of the mimicked joint.
                 _add_column_derivatives(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -230,13 +218,13 @@ def write_hessian(m, s, program, place, pairs, b, reference, state, to):
 
 
 def _add_column_derivatives(s, program, i, first, end, reference):
-    """Add the derivatives of column i with respect to the motion of each joint.
+    """Add the derivatives of column i.
 
-    Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
-    parts of column i turn with the earlier joint. A later joint moves only the reference point of the column,
-    which is the frame's origin. In the reference frame WORLD, the reference point does not move, so a later
-    joint does not change the column. An earlier joint moves the axis of column i and the frame as one rigid
-    body. In the reference frame LOCAL, an earlier joint therefore does not change the column.
+    | reference frame | an earlier joint moves | a later joint moves |
+    |---|---|---|
+    | LOCAL_WORLD_ALIGNED | column i turns | the frame's origin moves |
+    | WORLD | column i moves, the world's origin does not | no change |
+    | LOCAL | no change: column i and the frame move as one rigid body | the frame moves |
     """
     v_i, w_i = load_vector(s, program[i]), load_vector(s, program[i] + 3)
     for j in range(first, end, HESSIAN_COLUMN_WIDTH):

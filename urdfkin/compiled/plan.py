@@ -41,7 +41,8 @@ class JointMotion(IntEnum):
 class Geometry(IntEnum):
     """Columns of `CompiledTree.geometry`.
 
-    The offset is the vector from the previous moving joint to this joint, in the previous joint's axes.
+    Attributes:
+        OFFSET: Vector from the previous moving joint, in that joint's axes.
     """
 
     R = 0
@@ -66,8 +67,8 @@ _MOTION = {
 }
 
 #: Motions of each kind of joint. A motion is a pair (axis, is_rotation).
-#: The numbers 0, 1 and 2 of `axis` are the axes x, y and z of the joint's frame.
-#: `is_rotation` is True for a rotation about the axis, and False for a translation along the axis.
+#: `axis`: 0 for x, 1 for y, 2 for z of the joint's frame.
+#: `is_rotation`: True for a rotation, False for a translation.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.REVOLUTE: ((2, True),),
     JointMotion.PRISMATIC: ((2, False),),
@@ -78,37 +79,29 @@ _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The moving joints and the frames that a computation needs, stored in arrays.
+    """The moving joints and the frames that a computation needs.
 
-    The joints are sorted from the base outwards: a joint comes after all joints on the path from the base to
-    this joint.
+    The joints are sorted from the base outwards.
 
-    Attributes:
-        joints: Indices of the moving joints in the tree's list of joints.
-        steps: (steps, 3) integers; `StepField` names the three columns.
-        geometry: (steps, 14); `Geometry` gives the first column of each quantity.
-        frames: (frames, 2) two integers for each frame. The first integer is the row of the frame's last
-            moving joint in `steps`, or -1 if no joint moves the frame. The second integer is the frame's
-            index in the output. The frames are sorted by the first integer.
-        offsets: (frames, 12) rotation matrix and translation of each frame, relative to the frame's last
-            moving joint, in the order of `frames`.
-        columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
-        multipliers: (columns,) factor of each Jacobian column. The factor is the multiplier in the joint's
-            mimic rule, or 1 if the joint has no mimic rule.
-        sum_columns: (frames, columns) integers, one row for each frame. Element c is -1 if the joint of
-            column c does not move the frame. Otherwise, element c is the index of the column to which column
-            c is added. Joints with the same index in v, such as a joint and its mimic joints, share one
-            column. The shared column is the column of the first of these joints on the path to the frame.
-        q_indices: Indices of the coordinates that the recursion needs.
-        parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
-        lengths: (steps + frames,) lengths (m) of paths: first one path for each moving joint, then one for
-            each frame, in the order of `frames`. The path of a joint begins at the previous moving joint and
-            ends at the joint. The path of a frame begins at the frame's last moving joint and ends at the
-            frame. Without a previous moving joint, the path begins at the base. A length is the sum of
-            `Joint.length` over the joints after the beginning of the path, including fixed joints.
-        depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
-            output order.
+    | array | shape | content |
+    |---|---|---|
+    | joints | | indices of the moving joints in the tree |
+    | steps | (steps, 3) | integers of each moving joint; `StepField` names the columns |
+    | geometry | (steps, 14) | numbers of each moving joint; `Geometry` names the columns |
+    | frames | (frames, 2) | last moving joint (row in `steps`, or -1), index in the output; sorted |
+    | offsets | (frames, 12) | rotation and translation from the last moving joint, in the order of `frames` |
+    | columns | (columns, 4) | integers of each Jacobian column; `ColumnField` names the columns |
+    | multipliers | (columns,) | multiplier of the joint's mimic rule; 1 without a rule |
+    | sum_columns | (frames, columns) | column to which each column is added; -1: no effect on the frame |
+    | q_indices | | indices of the coordinates that the recursion needs |
+    | parents | (steps,) | row of the previous moving joint; -1 for none |
+    | lengths | (steps + frames,) | path lengths (m) to each moving joint, then to each row of `frames` |
+    | depth | (frames,) | number of joints from the root, in output order |
+    | tilts | (frames,) | sum of `Joint.tilt` (rad) from the root, in output order |
+
+    `sum_columns`: joints with the same index in v share the column of the first joint on the path.
+    `lengths`: a path begins at the previous moving joint or at the base. The length of a path is the sum of
+    `Joint.length` over the following joints, fixed joints included.
     """
 
     nq: int
@@ -141,7 +134,6 @@ class CompiledTree:
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether lengths are so large that results may overflow for ordinary coordinates and velocities."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
@@ -154,7 +146,10 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Compile the joints that move the given links; results are in the order of `links`."""
+    """Compile the joints that move the given links.
+
+    Results are in the order of `links`.
+    """
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:
@@ -195,10 +190,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the depth of each link that lies on a path from the root to one of `links`.
-
-    The depth of a link is the number of joints between the root and the link.
-    """
+    """Return the depths of `links` and of their ancestors."""
     visited = {0}
     for end in links:
         link = end
@@ -212,9 +204,10 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """The pose `T` of a link relative to the last moving joint before the link.
+    """A link's pose relative to the last moving joint.
 
-    `step` is the row of this joint in `CompiledTree.steps`, or -1 if no joint moves the link.
+    Attributes:
+        step: Row in `CompiledTree.steps`; -1 for none.
     """
 
     step: int
@@ -237,7 +230,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], joints: Iterabl
 
 
 def axis_pose(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4) that rotates the z axis to the joint's axis."""
+    """Return a pose with z along the joint's axis."""
     return pose(rotation_with_z_axis(joint.axis) if joint.kind.has_axis else None)
 
 
@@ -293,10 +286,7 @@ def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[
 class Op(IntEnum):
     """Instructions of a program.
 
-    TRANSLATE is a constant translation in any direction, and ROTATE is a constant rotation about any axis. An
-    instruction with the suffix X, Y or Z translates along this coordinate axis or rotates about this axis.
-    Instructions with a suffix are faster. STORE_AXIS stores the data that the Jacobian column of a joint
-    needs.
+    The special cases for X, Y and Z are faster.
     """
 
     END = 0
@@ -320,12 +310,15 @@ class Op(IntEnum):
 
 
 class ProgramHeader(IntEnum):
-    """Indices of the integers at the beginning of a program, before the instructions.
+    """Indices of the integers at the beginning of a program.
 
-    CODE is the index of the first instruction. Inputs are read in blocks of eight numbers. The list of the
-    blocks of q begins at BLOCKS_Q. The list of the blocks of v begins at BLOCKS_V and ends before BLOCKS_END.
-    The list of joint angles begins at ANGLES and ends before ANGLES_END. The inputs q, v, a and the base's
-    state begin at the scratch rows Q, V, A and BASE.
+    | index | integer |
+    |---|---|
+    | CODE | index of the first instruction |
+    | BLOCKS_Q, BLOCKS_V | beginning of the list of blocks of q or v, eight numbers each |
+    | BLOCKS_END | end of the list of blocks of v |
+    | ANGLES, ANGLES_END | beginning and end of the list of joint angles |
+    | Q, V, A, BASE | first scratch row of each input |
     """
 
     CODE = 0
@@ -343,25 +336,22 @@ class ProgramHeader(IntEnum):
     BASE = 12
 
 
-#: Number of doubles in a row of scratch memory, one for each of eight configurations.
+#: Number of doubles in a scratch row, one per configuration.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers for an instruction: the operation, three operands, and the index of its constants.
+#: Integers per instruction: operation, three operands, index of its constants.
 INSTRUCTION_WIDTH = 5
-#: Number of integers that describe a joint angle in a program.
-#: The integers are the scratch rows of the angle and of its sine, the index of the mimic rule, and a flag.
-#: The flag is 1 if the mimic rule changes the angle.
+#: Integers per joint angle: scratch rows of the angle and of its sine,
+#: index of the mimic rule, and whether the rule changes the angle.
 ANGLE_WIDTH = 4
-#: Rows of scratch memory. Row 0 contains the number 0, and row 1 contains the number 1.
-#: Rows 2 to 17 contain the results of a frame, and row 18 contains a joint angle.
-#: All other numbers are in the rows from row 19 on.
+#: Scratch rows. Row 0: number 0. Row 1: number 1.
+#: Rows 2 to 17: results of a frame. Row 18: a joint angle.
+#: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers that describe one Jacobian column in a program that computes a Hessian.
-#: The first integer is the first scratch row of the column.
-#: The second integer is the row in `steps` of the joint to which the column belongs.
-#: The third integer is this joint's index in v.
-#: The fourth integer is the first scratch row of a sum of derivatives with respect to this joint's motion.
+#: Integers per Jacobian column in a program for a Hessian:
+#: first scratch row of the column, the joint's row in `steps`, the joint's index in v,
+#: and first scratch row of the sum of derivatives with respect to the joint.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -376,8 +366,9 @@ _JOINTS = {
 class KernelProgram:
     """A program for a kernel.
 
-    `words` has three parts: the integers that `ProgramHeader` names, the lists, and the instructions. `rows`
-    is the number of rows of scratch memory that the program needs.
+    Attributes:
+        words: Header, lists and instructions.
+        rows: Number of scratch rows.
     """
 
     words: IntArray
@@ -386,7 +377,7 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Memory addresses of `words` and `constants`; they are valid while the program exists."""
+        """Addresses of `words` and `constants` while the program exists."""
         return address(self.words), address(self.constants)
 
     @cached_property
@@ -398,11 +389,10 @@ class KernelProgram:
 def compile_program(
     plan: CompiledTree, *, orientations: bool, columns: bool = False, hessian: bool = False
 ) -> KernelProgram:
-    """Return the program for the frames of a compiled tree.
+    """Return the program for a tree's frames.
 
-    The tree stores the program for later calls. If `orientations` is true, the program also computes the
-    orientation of each frame. The orientation is needed for placements, and for results in the frame's own
-    axes. If `hessian` is true, mimic joints have separate Jacobian columns, as a Hessian requires.
+    Results in frame axes need `orientations`.
+    A Hessian needs separate columns for mimic joints.
     """
     key = orientations, columns, hessian
     program: KernelProgram | None = plan.cache.get(key)
@@ -467,10 +457,12 @@ class _ProgramWriter:
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield one event for each moving joint and each frame, in the recursion's order.
+        """Yield joints and frames in the recursion's order.
 
-        The event for a joint is (previous moving joint, joint, None). The event for a frame is (last moving
-        joint before the frame, None, frame). The numbers are indices; the index -1 means the base.
+        Yields:
+            joint: (previous moving joint, joint, None)
+            frame: (last moving joint, None, frame)
+            -1: the base
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -481,10 +473,9 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Add a SAVE instruction if the state after joint `step` is needed again later.
+        """Save a state that a later event needs.
 
-        `following` is the index of the next event. At this event, the state is still in the registers. For
-        later events, the state must be saved in scratch memory.
+        At the event `following`, the state is still in the registers.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
@@ -501,10 +492,7 @@ class _ProgramWriter:
         return len(self.constants) - len(numbers)
 
     def _add_transform(self, R: FloatArray, p: FloatArray, *, orientations: bool = True) -> bool:
-        """Add the instructions for a translation by p and a rotation by R.
-
-        Return whether any instruction was added.
-        """
+        """Return whether any instruction was added."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -544,10 +532,7 @@ class _ProgramWriter:
         )
 
     def _add_frame(self, f: int) -> bool:
-        """Add the instructions for a frame's results.
-
-        Return whether the instructions overwrite the state of the last moving joint.
-        """
+        """Return whether the last joint's state is overwritten."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._add_transform(offsets[:9].reshape(3, 3), offsets[9:], orientations=self.orientations)
         sources = 0
@@ -569,10 +554,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the index of the scratch row that contains each element of the frame's (6, nv) matrix.
-
-        The six numbers of Jacobian column c begin at the scratch row `row + COLUMN_ROWS * c`.
-        """
+        """Return the scratch row of each matrix element."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):
@@ -580,11 +562,6 @@ class _ProgramWriter:
         return sources.ravel().tolist()
 
     def _hessian_entries(self, f: int) -> list[int]:
-        """Return the integers that the Hessian of a frame needs.
-
-        The integers are the number of columns, then `HESSIAN_COLUMN_WIDTH` integers for each column, and then
-        the scratch rows of the result.
-        """
         columns, sum_columns = self.plan.columns, self.plan.sum_columns[f]
         own = np.flatnonzero(sum_columns >= 0)
         rows = self.column_rows + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * sum_columns[own]
@@ -600,17 +577,14 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the first index of each block that contains at least one of `indices`.
-
-    A block consists of eight consecutive indices, and begins at a multiple of eight.
-    """
+    """Return the first index of each needed block."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
 #: Number of bytes in a cache line.
-#: Access to a vector in two cache lines takes twice as long as access to a vector in one cache line.
+#: Access to a vector in two cache lines takes twice as long.
 _CACHE_LINE = 64
-#: The integer that represents each reference frame in a kernel.
+#: Number of each reference frame in a kernel.
 #: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
@@ -620,7 +594,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Indices in the array of a kernel's arguments.
 
-    The arguments from KERNEL to COUNT are used only by functions that compute a single configuration.
+    KERNEL to COUNT are only for single configurations.
     """
 
     PROGRAM = 0
@@ -631,10 +605,10 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
+    #: Address of the base's state (24 numbers); 0 for a fixed base.
     BASE = auto()
-    #: Number of doubles from the beginning of one configuration to the beginning of the next configuration.
-    #: A stride is 0 if the array has only one row, which is used for all configurations.
+    #: Doubles from one configuration to the next;
+    #: 0 if one row is for all configurations.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -642,7 +616,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     OUTPUT_WIDTH = auto()
-    #: Address of the buffer that collects a block's results before they are written; 0 without a buffer.
+    #: Address of the buffer for a block's results; 0 without a buffer.
     BUFFER = auto()
 
     KERNEL = auto()
@@ -666,7 +640,7 @@ def make_scratch(program: KernelProgram) -> FloatArray:
 
 
 def aligned_empty(count: int) -> FloatArray:
-    """Return an uninitialized array of `count` numbers, aligned to a cache line."""
+    """Return an uninitialized array, aligned to a cache line."""
     numbers = np.empty(count + _CACHE_LINE // 8)
     first = -address(numbers) % _CACHE_LINE // 8
     return numbers[first : first + count]

@@ -34,16 +34,16 @@ if TYPE_CHECKING:
 #: Thresholds (s) for the time in plain Python.
 #: The table in the module's docstring lists the action for each threshold.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
-#: Each further kernel is loaded when plain Python has taken this time (s).
+#: The first kernel is loaded after `LOAD_AFTER` of plain Python.
+#: Each further kernel is loaded after this time of plain Python, s.
 _LOAD_NEXT_AFTER = 0.03
-#: Time (s) that the fast function saves in each call with one configuration.
+#: Time that the fast function saves per call, s.
 _SECONDS_SAVED = 5e-5
-#: Time (s) after which the cache folder is searched again for a missing kernel.
+#: Interval between searches for a missing kernel, s.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two groups of kernels with about equal compile times; each of two processes compiles one group.
+#: Two groups of kernels with about equal compile times.
 _FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
 _SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -60,7 +60,7 @@ _modes: list[ComputeMode] = []
 
 @contextmanager
 def use_only(mode: ComputeMode) -> Iterator[None]:
-    """While the context is open, use only Python numbers ("interpreted") or only kernels ("compiled")."""
+    """Compute only with Python numbers or only with kernels."""
     _modes.append(mode)
     try:
         yield
@@ -69,14 +69,13 @@ def use_only(mode: ComputeMode) -> Iterator[None]:
 
 
 def add_time(name: str, seconds: float) -> None:
-    """Add `seconds` to the total time of computations without the kernel `name`."""
     _seconds_spent[name] = _seconds_spent.get(name, 0.0) + seconds
 
 
 def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_MODULE) -> Any:
-    """Return a kernel, or None if plain Python is faster.
+    """Return a kernel, or None to use plain Python.
 
-    `expected_seconds` is the time (s) that the next computations would take in plain Python.
+    `expected_seconds` is the time of the next computations in plain Python.
     """
     if _modes and _modes[-1] == "interpreted":
         return None
@@ -97,10 +96,9 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 
 
 def should_load_single(name: str) -> bool:
-    """Return whether to load the function that computes one configuration with the kernel `name`.
+    """Return whether to load the function for one configuration.
 
-    Each call of `should_load_single` adds `_SECONDS_SAVED` to the time (s) that the function could have
-    saved. A call adds nothing while `use_only` is active, or before the kernel is loaded.
+    Each call counts the time that the function could have saved.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -120,10 +118,6 @@ def load_kernel(name: str, module: str = KERNELS_MODULE) -> Any:
 
 
 def _is_on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk.
-
-    For `_SEARCH_INTERVAL` seconds after a search without success, return False without a new search.
-    """
     folder = kernel_cache_folder()
     if folder is None or time.monotonic() < _next_search.get((folder, name), 0.0):
         return False
@@ -135,7 +129,7 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Python code for the second process: the process ends when its standard input closes.
+#: The second process ends when its standard input closes.
 #: The standard input closes when the first process ends.
 _EXIT_WITH_PARENT = (
     "import os, sys, threading;"
@@ -145,15 +139,11 @@ _background: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_in_background(name: str, module: str) -> bool:
-    """Start a second process that compiles a kernel.
-
-    Return False if the caller must load or compile the kernel itself, and True otherwise. The function starts
-    no process while an earlier process is running, and only one process for each kernel.
-    """
+    """Return False if the caller must load the kernel."""
     if kernel_cache_folder() is None:
         return False
     if not compile_lock.acquire(blocking=False):
-        return True  # Another thread compiles a kernel, or starts the second process.
+        return True  # Another thread compiles, or starts the second process.
     try:
         if any(process.poll() is None for process in _background.values()):
             return True
@@ -193,10 +183,7 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Close a forked child's copy of the pipe to the second process.
-
-    The pipe then stays open only in the parent process.
-    """
+    """Let the second process end with its parent."""
     for process in _background.values():
         process.returncode = 0
         _close(process)
@@ -215,10 +202,6 @@ def all_kernels_on_disk() -> bool:
 
 
 def load_all_kernels() -> None:
-    """Load or compile the kernels of both groups before several processes start.
-
-    The processes then need not compile these kernels.
-    """
     missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_GROUP))
     compiler = _start_compiler(_SECOND_GROUP) if missing else None
     try:

@@ -20,7 +20,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import import_lock
 
-#: A function f(q, out), f(q, v, out) or f(q, v, a, out) that returns None for unsupported arguments.
+#: f(q, out), f(q, v, out) or f(q, v, a, out); None for unsupported arguments.
 FastFunction = Callable[..., FloatArray | None]
 
 
@@ -43,13 +43,13 @@ class _PreparedRobot(Protocol):
 
 
 class PreparedFrame:
-    """Fast computation of the quantities of one frame, such as the Jacobian, in one reference frame.
+    """Fast computation of one frame's quantities, such as the Jacobian.
 
     `Robot.prepare` creates the object. Results are exactly the same numbers as those of `Robot`. With
-    `verify=True`, urdfkin compares each result with Pinocchio's result and uses the tolerance of `Robot`.
-    With `verify=False`, results are not checked, and `Robot.certificate` reports them as unchecked.
-    Contiguous float64 arrays are used directly. For arguments of other types, `Robot` computes the result or
-    raises the error. Several threads may share one object, also on free-threaded Python.
+    `verify=True`, urdfkin compares each result with Pinocchio's result. With `verify=False`,
+    `Robot.certificate` reports the results as unchecked. Contiguous float64 arrays are used directly. For
+    other arguments, `Robot` computes the result or raises the error. Several threads may share one object,
+    also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -92,10 +92,10 @@ class PreparedFrame:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
         #: Whether `Robot.prepare` created this object.
-        #: The first call of an object from `Robot.prepare` loads or compiles machine code.
+        #: The first call loads or compiles machine code.
         self.always_load = False
         # Each attribute first contains `_compute_first`.
-        # `_compute_first` replaces the attribute by the fast function of the quantity.
+        # `_compute_first` replaces this attribute by the fast function.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -103,7 +103,7 @@ class PreparedFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # The fast functions contain memory addresses that are valid only in this process.
+        # Fast functions contain memory addresses of this process.
         # Unpickling therefore makes a new object with `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
@@ -146,7 +146,9 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: ConfigurationLike, out: FloatArray | None = None) -> FloatArray:
-        """Return the Hessian (6, nv, nv), the derivative of the Jacobian with respect to each joint's motion.
+        """Return the Hessian (6, nv, nv).
+
+        The Hessian is the derivative of the Jacobian with respect to each joint's motion.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -176,10 +178,9 @@ class PreparedFrame:
         )
 
     def _compute_first(self, quantity: str, q: ConfigurationLike, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity, and return its first result.
+        """Create a fast function and compute the first result.
 
-        Return None if `Robot` must compute the result. For example, loading the fast function may take longer
-        than the computation.
+        None means that `Robot` must compute the result.
         """
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large

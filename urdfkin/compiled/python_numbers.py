@@ -11,15 +11,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
-#: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
-#: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
+#: No result overflows if all inputs are below this bound.
+#: N joints: joint velocity < LARGE^2, path length d < N LARGE^2,
+#: angular velocity w < N LARGE^2, largest product w^2 d < N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number between -2^51 and 2^51, the sum is rounded to an integer.
-#: The lowest bits of the sum's mantissa then contain the number, rounded to the nearest integer.
+#: Adding this constant rounds a number below 2^51 to an integer.
+#: The lowest bits of the sum's mantissa are this integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -40,14 +40,14 @@ COSINE = (
 
 
 def _c_fma() -> Callable[[float, float, float], float]:
-    """Return the fused multiply-add of the C library that the Python process has loaded."""
+    """Return the C library's fused multiply-add."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
     return function
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add that gives inf or nan if `math.fma` raises an error."""
+    """Return a fused multiply-add that never raises."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -106,7 +106,7 @@ class Number:
 
 
 class Product:
-    """A product that is stored as its two factors."""
+    """A product, stored as two factors."""
 
     __slots__ = ("x", "y")
 
@@ -145,7 +145,7 @@ class Product:
 
 
 class ConstantNumber:
-    """The constant 0, the constant 1, or the placeholder `unused()` (`value` is None)."""
+    """The constant 0 or 1, or `unused()`."""
 
     __slots__ = ("value",)
 
@@ -178,10 +178,7 @@ class ConstantNumber:
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float.
-
-    The number must not be `unused()`.
-    """
+    """Convert a number to a float, except `unused()`."""
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)
@@ -199,12 +196,12 @@ def one() -> ConstantNumber:
 
 
 def unused() -> ConstantNumber:
-    """Return the placeholder for a number that no output needs."""
+    """Return the placeholder for an unneeded number."""
     return _UNUSED
 
 
 def round_product(x: Any) -> Any:
-    """Multiply the factors of a `Product` and round the result; return any other number unchanged."""
+    """Convert a `Product` to a rounded `Number`."""
     return Number(x.x * x.y) if type(x) is Product else x
 
 
@@ -228,7 +225,7 @@ def load_constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
+broadcast = Number  # The compiled `broadcast` copies a double to eight lanes.
 
 
 def array_data(array: Any) -> Any:
@@ -236,7 +233,10 @@ def array_data(array: Any) -> Any:
 
 
 def doubles_at(address: Any) -> Any:
-    """Return the list `address`. The compiled `doubles_at` converts an address to a pointer."""
+    """Return the list `address`.
+
+    The compiled `doubles_at` converts an address to a pointer.
+    """
     return address
 
 
@@ -264,7 +264,7 @@ def is_in_range(total: Number) -> bool:
 
 
 def wait_for_writes(*_: object) -> None:
-    """Do nothing. The compiled `wait_for_writes` waits until all results are in memory."""
+    """Do nothing."""
 
 
 stream = wait_for_writes
@@ -274,7 +274,10 @@ stream = wait_for_writes
 
 
 def sine_cosine(s: object, row: int, angle: Number) -> tuple[Number, Number]:
-    """Return (sine, cosine) of an angle; `urdfkin.compiled.machine.sine` explains the steps."""
+    """Return (sine, cosine) of an angle.
+
+    See `urdfkin.compiled.machine.sine` for the steps.
+    """
     x = angle.x
     if not abs(x) < LARGEST_ANGLE:
         return (Number(math.sin(x)), Number(math.cos(x))) if math.isfinite(x) else (Number(math.nan),) * 2

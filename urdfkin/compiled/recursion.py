@@ -106,15 +106,12 @@ def world_axes(own, world):
 
 
 def express(axes, R, x):
-    """Convert a vector x from link axes to the axes that `axes` selects: link axes or world axes."""
+    """Convert x from link axes to the selected axes."""
     return axes(x, eq.rotate(R, x))
 
 
 def express_after_rotation(axes, S, x):
-    """Return the new components of a vector after the link's frame is rotated by S.
-
-    `x` contains the old components. The rotation of the frame does not change the vector itself.
-    """
+    """Return a vector's components after a frame's rotation."""
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 
@@ -122,7 +119,10 @@ def express_after_rotation(axes, S, x):
 
 
 def translate_frame(axes, state, d):
-    """Return the state of the link's point at `d` in link axes (7.58, 7.128, 7.130)."""
+    """Move the frame's origin by d (7.58, 7.128, 7.130).
+
+    The vector d is in link axes.
+    """
     R, p, w, vel, alpha, acc = state
     lever = express(axes, R, d)
     return (
@@ -136,10 +136,7 @@ def translate_frame(axes, state, d):
 
 
 def rotate_frame(axes, state, S):
-    """Return a link's state after the link's frame is rotated by S, so that R becomes R S.
-
-    The motion of the link does not change. However, vectors in link axes get new components.
-    """
+    """Rotate the frame by S: R becomes R S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -154,7 +151,7 @@ def rotate_frame(axes, state, S):
 def _rotate_about_z(axes, state, s, row):
     """Rotate the frame about z (7.5).
 
-    The scratch rows `row` and `row + 1` contain the sine and the cosine of the angle.
+    Scratch row `row` contains the sine, then the cosine.
     """
     return rotate_frame(axes, state, eq.about_z(load_number(s, row), load_number(s, row + 1), zero(), one()))
 
@@ -175,10 +172,9 @@ def after_prismatic(axes, state, slide, v, a):
 
 
 def add_free_motion(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and the acceleration of a planar or floating joint to the state.
+    """Add the motion of a planar or floating joint.
 
-    The velocity and the acceleration are in the child link's axes. The state already contains the joint's
-    translation and rotation.
+    The motion is in the child link's axes. The state must already contain the joint's displacement.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = (
@@ -198,10 +194,7 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(s, row, g, c, is_mimic):
-    """Return a joint's coordinate.
-
-    The product and the sum of a mimic rule are rounded separately, as in Pinocchio.
-    """
+    """Round the mimic rule's product separately, as in Pinocchio."""
     x = load_number(s, row)
     if is_mimic:
         x = round_product(load_constant(g, c) * x) + load_constant(g, c + 1)
@@ -303,12 +296,9 @@ def _restore_state(s, row, state):
 
 
 def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read q, v or a of `m` configurations into scratch memory, in blocks of eight numbers.
+    """Read whole blocks of eight numbers, which is faster.
 
-    `blocks` contains the first index of each block that the recursion needs. A whole block is read faster
-    than a part of a block. If a configuration ends inside a block, the function may therefore also read the
-    first numbers of the next configuration. Inputs that are read later overwrite these surplus numbers, or no
-    instruction uses the surplus numbers.
+    No instruction uses the surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -319,7 +309,6 @@ def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
 
 def _base_state(axes, m, s, args, row, b):
-    """Return the state of the root link, which moves with the base."""
     nil, unit = broadcast(0.0), broadcast(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -342,7 +331,7 @@ def _base_state(axes, m, s, args, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
+    """Run before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _joint_coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -382,10 +371,12 @@ def _execute_transform(axes, op, state, g, c):
 def _execute_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The scratch rows `v` and `a` contain the joint's velocity and acceleration. The scratch row `x` contains
-    the sine of the joint angle for a revolute joint, and the first coordinate for other joints. For a planar
-    joint, the scratch row `z` contains the sine of the joint angle. For a revolute or prismatic joint, `z` is
-    1 if a mimic rule changes the coordinate, else 0. The constants of the mimic rule begin at `g[c]`.
+    | operand | content |
+    |---|---|
+    | x | scratch row of the sine (revolute) or of the first coordinate |
+    | v, a | scratch rows of the joint's velocity and acceleration |
+    | z | planar: scratch row of the sine; revolute, prismatic: 1 with a mimic rule, else 0 |
+    | c | index of the mimic rule's constants in `g` |
     """
     if op == _REVOLUTE:
         rate, rate_2 = _joint_rate(state[2][0], s, v, g, c, z), _joint_rate(state[4][0], s, a, g, c, z)
@@ -432,7 +423,7 @@ def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, sto
     at, stage = program[_CODE], args[_BUFFER]
     to, first = (doubles_at(stage), 0) if stage else (doubles_at(args[_OUT]), b)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
-        # The base is at rest, so a translation as the first instruction changes only the position.
+        # The base is at rest, so a translation changes only the position.
         state = _shift_position(state, _constant_vector(g, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:
@@ -460,9 +451,7 @@ def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, sto
 def forward_recursion(address, axes, orders, mask, store, column, write):
     """Execute a program for every block of configurations.
 
-    Return 1 if an input is nan, infinite or too large, else 0. `address` is the address of the kernel's
-    arguments, which `KernelArgs` describes. The number `orders` is 1 for q, 2 for q and v, and 3 for q, v and
-    a. `mask`, `store`, `column` and `write` are functions of `urdfkin.compiled.outputs`.
+    `orders` is 1 for q, 2 for q and v, 3 for q, v and a.
     """
     args = integers_at(address)
     program, g, s = integers_at(args[_PROGRAM]), doubles_at(args[_CONSTANTS]), doubles_at(args[_SCRATCH])

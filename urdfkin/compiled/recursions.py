@@ -73,14 +73,12 @@ def jacobian_rates(args):
 
 
 def hessians(args):
-    """Compute the derivative of each Jacobian column with respect to each joint's motion."""
     return forward_recursion(
         args, world_axes, 1, mask_for_placement, store_axis, write_jacobian_column, write_hessian
     )
 
 
 def imus(args):
-    """Compute accelerometer and gyroscope readings in each frame's own axes."""
     return forward_recursion(
         args, link_axes, 3, mask_for_acceleration, store_no_axis, write_no_column, write_imu
     )

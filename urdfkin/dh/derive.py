@@ -41,7 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
+#: Tolerance of a right angle, rad; 1.571 is a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {
@@ -56,7 +56,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class DerivationOptions:
-    """Options for the derivation of a table; `urdfkin.dh.make.make_dh_table` explains each option."""
+    """Options of `urdfkin.dh.make.make_dh_table`."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -79,11 +79,10 @@ class DerivationOptions:
 
 
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
-    """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
+    """Derive a table from a chain.
 
-    `like` is a standard table of the same joints. The result copies from `like` the directions of the x axes,
-    and the offsets d along parallel axes. With `like`, `options.sign` has no effect, and
-    `options.parallel_offset` has an effect only if its value is "first".
+    `like` is a standard table of the same joints.
+    With `like`, `options.sign` has no effect.
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -146,7 +145,6 @@ def _make_table(
 
 
 def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Reverse the z axis of each joint in `flip`, and return the new constant poses of the chain."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -159,7 +157,6 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
-    """Shift the axes of prismatic joints. A prismatic joint defines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -179,7 +176,6 @@ def _place_prismatic_axes(
 
 
 def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: list[bool]) -> bool:
-    """Shift the axis of joint k to the origin of a neighbouring revolute joint, if there is one."""
     if k + 1 < len(is_prismatic) and not is_prismatic[k + 1]:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -190,10 +186,7 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the axis of prismatic joint k to the origin of a neighbouring joint with a nearly parallel axis.
-
-    Without the shift, the common normal of the two axes may be far away from the robot.
-    """
+    """Avoid a common normal far away from the robot."""
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -209,7 +202,7 @@ def _shift_to_previous_origin(constants: list[FloatArray], k: int) -> None:
 
 
 def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Shift the frame of joint k by `offset`, a vector with components in this frame."""
+    """`offset` is a vector in the frame of joint k."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -218,17 +211,21 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 
 
 def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and the offset along z_0 from frame 0 to joint 1."""
+    """Find frame 0.
+
+    Returns:
+        T_base_0, and the angle and offset to joint 1.
+    """
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # The projection of the base's x axis e onto the plane normal to z is x = e - (e . z) z.
-    # The expression below equals x, and has no cancellation if z is close to e.
+    # Projection of the base's x axis e onto the plane normal to z: x = e - (e . z) z.
+    # The expression below has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
+    # If z_0 is nearly the base's x axis, x_0 is the projected y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
@@ -256,8 +253,8 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", each row contains the offset of its own link here.
-    # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
+    # For parallel_offset="first", each row has its own link's offset.
+    # `_sum_offsets_in_first_row` then moves the sum to the first parallel axis.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -296,9 +293,9 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta of the first row from `like`, and change the base to compensate.
+    """Copy theta from the reference, and adjust the base.
 
-    If the first row of `like` has d = 0, the base also compensates for d, and the result has d = 0.
+    If the reference has d = 0, d becomes 0.
     """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
@@ -311,11 +308,10 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a and alpha of the last row from `like`, and change the tool to compensate.
+    """Copy theta, a and alpha, and adjust the tool.
 
-    If the last row of `like` has d = 0, the tool also compensates for d, and the result has d = 0. Nothing is
-    copied if neither table has a tool and the two angles theta are nearly equal. Then only a rounding error
-    of theta is removed.
+    If the reference has d = 0, d becomes 0.
+    Nothing is copied if neither table has a tool and theta nearly agrees.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
@@ -338,9 +334,10 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
-    """Whether the last row can contain the transform A, so that the table needs no tool.
+    """Whether the table needs no tool.
 
-    A standard table ends with Rz Tz Tx Rx, and a modified table ends with Rz Tz.
+    standard   A = Rz Tz Tx Rx
+    modified   A = Rz Tz
     """
     if options.last == "flange":
         return False
@@ -359,11 +356,7 @@ def _make_last_row(
     options: DerivationOptions,
     noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Return theta and d of the last row, the transform with a and alpha of the last row, and the tool.
-
-    `A` is the tip's pose in a frame with the origin O_{n-1}. The axes of this frame are parallel to the axes
-    of the last joint's frame.
-    """
+    """`A` is the tip's pose relative to the origin O_{n-1}."""
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = clean_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)

@@ -48,18 +48,15 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 
 @dataclass(frozen=True, slots=True)
 class TreeRow:
-    """The row of one joint and its child link, in metres and radians.
+    """The row of one joint.
 
-    The cells gamma, b, d, alpha, beta, theta and r define the pose of the link's frame in the antecedent's
-    frame. This pose is Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r). The joint's value is added
-    to theta if sigma is 0, and to r if sigma is 1.
+    The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
+        antecedent: Row index of the antecedent; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        mimicked_joint: Name of the mimicked joint; the joint's own name if it mimics no other joint.
-        multiplier: Factor of the mimic rule. The value of a mimic joint is
-            multiplier * (value of the mimicked joint) + offset.
+        mimicked_joint: The joint's own name without a mimic rule.
+        multiplier: value = multiplier * mimicked value + offset
     """
 
     joint: str
@@ -80,14 +77,12 @@ class TreeRow:
 
 @dataclass(frozen=True)
 class TreeParameters:
-    """The table of a whole robot, with a row for each joint, including fixed joints.
+    """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) length (metres) of the URDF's path from the root to each joint's origin. The
-            method `reach` adds the travel of prismatic joints.
-        T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        zeroed_tilt: A tilt that may be a rounding error is set to zero. `zeroed_tilt` is the largest sum
-            (rad) of such tilts on a path from the root.
+        path_lengths: (joints,) lengths from the root, m.
+        T_frame_link: (joints, 4, 4) URDF link frames.
+        zeroed_tilt: Largest sum of tilts set to zero, rad.
     """
 
     robot: str
@@ -99,22 +94,23 @@ class TreeParameters:
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the independent moving joints, in the tree's order: the columns of `q`."""
+        """Names of the columns of `q`."""
         return tuple(row.joint for row in self.rows if row.sigma < 2 and row.mimicked_joint == row.joint)
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses, in eps * reach; not a proven bound.
+        """Estimated rounding error, in eps * reach.
 
-        The estimate does not include Pinocchio's rounding errors.
+        The estimate is not a proven bound, and excludes Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints) path length (metres) from the root to each link at `q`.
+        """Return path lengths to the links.
 
-        The result is the larger of the path lengths in the URDF and in the table.
+        Returns:
+            The larger of the URDF's and the table's lengths.
         """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -135,7 +131,6 @@ class TreeParameters:
         return path
 
     def _values(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints) values of all joints; zero for fixed joints."""
         column = {name: i for i, name in enumerate(self.coordinates)}
         values = np.zeros((*q.shape[:-1], len(self.rows)))
         for j, row in enumerate(self.rows):
@@ -144,9 +139,12 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
+        """Return the poses of all links.
 
-        `q` (..., coordinates) is in the order of `coordinates`. Another length raises InputError.
+        `q` is in the order of `coordinates`.
+
+        Returns:
+            (..., joints, 4, 4) URDF frames in the root frame.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -164,7 +162,7 @@ class TreeParameters:
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
-    """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding."""
+    """Return Khalil and Kleinfinger's parameters, exact up to rounding."""
     check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
@@ -191,11 +189,10 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 @dataclass(frozen=True, slots=True)
 class _LinkAxis:
-    """The axis frame of a link, with z along the axis of the link's joint.
+    """The axis frame of a link.
 
-    `T_antecedent_axis` is the pose of this axis frame in the antecedent's axis frame. `T_link_axis` is the
-    pose of this axis frame in the link's URDF frame. Small tilts on the path from the root to the link are
-    set to zero. `zeroed_tilt` is the sum (rad) of these tilts.
+    Attributes:
+        zeroed_tilt: Sum of tilts set to zero, rad.
     """
 
     antecedent: int
@@ -206,10 +203,10 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
+    """The link of a fixed joint uses its own frame."""
     links = list[_LinkAxis]()
-    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
-    # A moving link has its own index i. For all other links, i is the index of the antecedent.
+    # For each link: (i, T_i_link, number of fixed joints from link i).
+    # i is the moving link's own index, or the antecedent's index.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -226,15 +223,15 @@ def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis
 def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
-    """Return a transform for each joint, and an angle and an offset for each moving link.
+    """Rz(phi) Tz(delta) moves a link's axis frame to the row's frame.
 
-    The transform leads from the axis of the antecedent to the joint's axis. The angle is a rotation about z,
-    and the offset is a shift along z. This motion moves the axis frame of a link to the frame of its row.
+    Returns:
+        Transforms, and (phi, delta) by link.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
-        # The first moving child of a link defines the link's x axis.
+        # The first moving child defines the link's x axis.
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))
@@ -244,7 +241,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # For a link without a moving child, x is chosen so that theta is 0.
+    # Without a moving child, x makes theta 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)
@@ -282,7 +279,6 @@ def _make_row(
 
 
 def _path_lengths(tree: KinematicTree) -> list[float]:
-    """Return the length (m) of the path from the root to each joint's origin."""
     lengths = [0.0]
     for joint in tree.joints:
         lengths.append(lengths[joint.parent] + joint.length)
@@ -293,7 +289,7 @@ _FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), 
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
-    """Return plain data in metres and radians; row numbers begin at 1, and 0 is the root."""
+    """Row numbers begin at 1; 0 is the root."""
     return {
         "notation": "Khalil-Kleinfinger",
         "robot": table.robot,
@@ -316,7 +312,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule.
+    # The constant includes the offset of the mimic rule.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint
@@ -332,7 +328,6 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV (m, rad): the rows, each followed by the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):
@@ -342,7 +337,6 @@ def as_csv(table: TreeParameters) -> str:
 
 
 def measure_printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Compare the link positions of a printed and an exact table at `q` (n, coordinates)."""
     again = replace(table, rows=tuple(_round_tree_row(row, units) for row in table.rows))
     distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))

@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Maximum number of leading characters of a name that `find_similar_names` compares.
+#: Maximum length of a name in `find_similar_names`.
 _MAX_COMPARED_CHARACTERS = 128
 MAX_COMPARISONS = 1_000_000
 _MAX_SUGGESTIONS = 3
@@ -142,11 +142,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # A name from a file must not add lines or terminal commands to the message.
+        # Names from files must not add lines or terminal commands.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # `validate --jobs` pickles errors, and Python's own `__reduce__` loses keyword arguments.
+        # Python's own `__reduce__` loses keyword arguments.
         return _unpickle_error, (type(self), self.__dict__)
 
 

@@ -13,14 +13,14 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: First characters of a spreadsheet cell that make the cell a formula.
+#: First characters that make a spreadsheet cell a formula.
 FORMULA_STARTS = ("=", "+", "-", "@")
-#: Pattern of a command of Azure or TeamCity, anywhere in a line; group 1 is the character to escape.
+#: Command of Azure or TeamCity; group 1 is escaped.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: Patterns of the commands of all CI services; GitHub's commands are at the beginning of a line.
+#: Commands of CI services; GitHub's commands begin a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: Invisible character (word joiner) that keeps Markdown from making a link, a mention or an issue number.
+#: A word joiner prevents Markdown links, mentions and issue numbers.
 _WORD_JOINER = "&#8288;"
 
 

@@ -11,14 +11,13 @@ import math
 import re
 from typing import NamedTuple
 
-#: Pattern of a decimal number; matching takes time linear in the length of the text.
+#: A decimal number; matching takes linear time.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-#: Maximum number of characters of a number, because Python converts long integers in quadratic time.
+#: Maximum length; Python converts long integers in quadratic time.
 _MAX_LENGTH = 2000
 
-#: Patterns of invalid numbers, each with the remedy for the message.
-#: If several patterns match, the first pattern determines the remedy.
+#: Invalid numbers with their remedies; the first match counts.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),

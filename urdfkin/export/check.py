@@ -27,7 +27,7 @@ from urdfkin.system.processes import python_command
 #: Text in the first lines of every exported file.
 EXPORT_MARK = "straight-line code for this robot and frame"
 _ZEROS = "0" * 64
-#: Line of the header in which `seal` replaces the zeros by the digest.
+#: In this line, `seal` replaces the zeros by the digest.
 SEAL = f"Seal sha256 {_ZEROS}"
 _SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
@@ -39,11 +39,11 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: Compiler and options for a CUDA file that runs on a GPU.
+#: Compiler and options for a CUDA file.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
+#: Number of characters that are searched for `EXPORT_MARK` and UNVERIFIED.
 _HEADER_LENGTH = 2000
-#: Time limit (s) of a command; a robot with a thousand joints compiles in one minute.
+#: Time limit of a command, s; a thousand joints compile in a minute.
 _TIME_LIMIT = 600.0
 
 

@@ -45,7 +45,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default, GCC uses half of the width of vector registers on many processors.
+#: On many processors, GCC uses half of the vector width.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _load_counter = count()
@@ -142,9 +142,9 @@ def _load_code(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by the library's path, which contains the file descriptor.
-        # After the file is closed, a later library can get the same file descriptor.
-        # A different number of "./" for each library makes all paths different.
+        # The loader identifies libraries by their paths.
+        # A path contains a file descriptor, which later libraries can get again.
+        # The number of "./" makes all paths different.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -166,9 +166,9 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results. The results of eight configurations then need at most half a megabyte of stack.
+#: Maximum number of results; eight configurations need half a megabyte of stack.
 _MAX_RESULTS = 8192
-# Plain integers are several times as fast as members of an enumeration.
+# Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
     int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.BUFFER, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
@@ -223,7 +223,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._machine_codes: dict[str, Callable[[int], int] | None] = {}
-        # The first call of each function compiles the machine code, or reads it from the cache.
+        # The first call of each function compiles, or reads the cache.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -232,7 +232,7 @@ class CompiledFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # Memory addresses are not valid in another process, so unpickling creates a new object.
+        # Memory addresses are not valid in another process.
         return self._robot.compile, (self.frame, self.reference)
 
     def placement(
@@ -339,7 +339,7 @@ class CompiledFrame:
         with compile_lock, import_lock:
             from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
-        # The fast function checks neither the norm of a quaternion nor the range of the results.
+        # The fast function checks no quaternion norm and no result range.
         needs_checks = self._tree.floating_joints or self._plan.is_large
         if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
@@ -350,7 +350,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # Later calls do not warn, because the check takes time.
+            warn_of_degrees(self._tree, q)  # Later calls do not warn, to save time.
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
@@ -387,8 +387,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If a number is not finite, the code below checks the inputs again.
-            # The error message then names the coordinate of this number.
+            # If a number is not finite, the inputs are checked again.
+            # The message then names the coordinate.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -434,7 +434,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
+            # The code may write up to seven numbers beyond the results.
             # The buffer `stage` has space for these additional numbers.
             stage = (
                 aligned_empty(LANES * part[0].size + LANES) if row.has_columns and uses_buffer(out) else None

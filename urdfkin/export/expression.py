@@ -80,7 +80,7 @@ class Node:
 class Graph:
     """The expressions of one function; each node stores the number of the equation that created the node."""
 
-    #: The number 0. Each product with 0 and each difference x - x becomes this constant.
+    #: Products with 0 and differences x - x become this constant.
     zero: float = 0.0
 
     def __init__(self) -> None:

@@ -60,7 +60,7 @@ def make_chain_code(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        # The URDF of a chain is generated, so warnings about this URDF are useless to the user.
+        # Warnings about a generated URDF do not help the user.
         warnings.simplefilter("ignore", UrdfWarning)
         robot = get_hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame

@@ -43,7 +43,7 @@ INPUT_LETTERS = ("q", "v", "a")
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement.
 _MAX_OPERATIONS = 12
-#: Maximum number of results in one backward pass, to limit the memory.
+#: Maximum number of results in one backward pass.
 _MAX_RESULTS = 512
 
 
@@ -142,7 +142,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "cos": np.cos,
     "sqrt": np.sqrt,
 }
-#: Derivatives of an operation's value with respect to its operands.
+#: Derivatives of an operation with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),

@@ -40,8 +40,8 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
-#: The results for this number of random configurations are compared with Pinocchio's results.
-#: The comparison also covers the neutral configuration and the joint limits.
+#: Number of random configurations that Pinocchio checks.
+#: Pinocchio also checks the neutral configuration and the limits.
 PROOF_SAMPLES = 100
 VECTOR_COUNT = 4
 
@@ -158,7 +158,7 @@ def compare_with_pinocchio(
 
     Raise VerificationError if a difference exceeds the error bound.
     """
-    # A copy of the verifier makes the checks, because the user's certificate must not include these checks.
+    # The user's certificate must not include these checks.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:

@@ -242,7 +242,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    # The method `forward` calls the function that needs the fewest inputs.
+    # `forward` calls the function with the fewest inputs.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,
@@ -404,7 +404,7 @@ DIALECTS = {
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
         first_lines=_make_length_check(_LENGTH_MESSAGE),
         result=_make_nested_result("Matrix([", "])"),
-        # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
+        # SymPy simplifies slowly, so the check uses mpmath's numbers.
         values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
         '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
         "    with mpmath.workdps(60):\n"

@@ -184,7 +184,7 @@ def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Refere
 
 
 def _recursion(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # The reference WORLD needs the position p, which is computed in world axes.
+    # WORLD needs the position p in world axes.
     return TreeRecursion(plan, kind, inputs, own_axes=not reference.at_world)
 
 
@@ -194,7 +194,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
         case Reference.LOCAL | Reference.WORLD:
-            pass  # The components of both vectors already refer to the axes of the reference frame.
+            pass  # Both vectors already refer to the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

@@ -11,24 +11,23 @@ from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
-#: Largest accepted difference between 1 and the norm of a unit vector.
-#: If a vector is normalised in double precision, its norm differs from 1 by at most 4e-16.
-#: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
+#: Tolerance of a unit vector's norm.
+#: Normalising in double precision has an error of at most 4e-16.
+#: With six digits, Rodrigues' formula gives no rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
-#: If R is rounded to nine decimals, every entry of R has an error of at most 5e-10.
-#: An entry of R R^T is the dot product of two rows of R.
-#: The absolute values of the entries in a row of R sum to at most sqrt(3).
+#: Largest absolute entry of R R^T - I for a rotation matrix R.
+#: R with nine decimals: each entry has an error of at most 5e-10.
+#: Entry of R R^T: dot product of two rows of R.
+#: Sum of the absolute entries of a row: at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: The letters of NumPy's `dtype.kind` for complex numbers, bytes, text, timedelta, datetime and void.
-#: NumPy converts these kinds of data to floats without an error, although they are not real numbers.
+#: `dtype.kind` of complex numbers, bytes, text, timedelta, datetime and void.
+#: NumPy converts such data to floats without an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
 
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return real numbers as a float64 array; NaN and inf are allowed."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
     if _is_masked(value):
@@ -37,7 +36,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # Without this check, NumPy converts text and None in an object array to numbers or NaN.
+        # NumPy would convert text and None to numbers or NaN.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)
@@ -46,14 +45,16 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether any element is masked; `np.asarray` ignores the mask of an array."""
+    """Return whether any element is masked.
+
+    NumPy's `asarray` ignores masks.
+    """
     if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def as_finite(value: ArrayLike, name: str) -> FloatArray:
-    """Return finite real numbers as a float64 array of any shape."""
     array = as_floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -61,7 +62,6 @@ def as_finite(value: ArrayLike, name: str) -> FloatArray:
 
 
 def as_vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return finite vectors (..., size) as a float64 array."""
     array = as_finite(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -69,7 +69,6 @@ def as_vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return finite matrices (..., rows, columns) as a float64 array."""
     array = as_finite(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -99,9 +98,9 @@ def as_rotations(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotation_defect(R: FloatArray) -> FloatArray:
-    """Return the largest absolute entry of R R^T - I for each matrix R.
+    """Return the largest absolute entry of R R^T - I.
 
-    The result is inf if the determinant is not positive, or if R R^T overflows.
+    A reflection, a singular matrix or an overflow gives inf.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

@@ -12,8 +12,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: The textbook's LaTeX symbols for parameters of the functions in `equations`. The keys are parameter names.
-#: If a parameter has no entry, its name is the LaTeX symbol.
+#: The textbook's LaTeX symbols for parameters in `equations`.
+#: Other parameters use their names.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -28,7 +28,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: LaTeX symbols that apply only to the parameters of one function. The keys are function names.
+#: LaTeX symbols for the parameters of one function.
 #: An entry for a function has priority over `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
@@ -51,7 +51,11 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; `kind` determines whether `text` needs brackets inside a larger expression."""
+    """A LaTeX expression.
+
+    Attributes:
+        kind: `_ATOM`, `_CROSS` or `_SUM`.
+    """
 
     text: str
     kind: int = _ATOM
@@ -105,7 +109,7 @@ _latex_equations = bind_equations(
 
 
 def latex(name: str) -> str:
-    r"""Return the LaTeX text of a function of `urdfkin.kinematics.equations`.
+    r"""Return the LaTeX text of an equation's function.
 
     >>> print(latex("point_acceleration"))
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)
@@ -117,7 +121,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX text of one term, of a column of terms, or of a matrix of terms."""
+    """Write a term, column or matrix as LaTeX."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

@@ -15,16 +15,16 @@ State = TypeVar("State")
 Intermediate = TypeVar("Intermediate")
 
 _MOST_STEPS = 100
-#: Damping of the first step, smallest damping and largest damping, divided by the largest singular value.
+#: First, smallest and largest damping, relative to the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: After a step that reduces the error, the damping is multiplied by the first number.
-#: After a rejected step, the damping is multiplied by the second number.
+#: Factor of the damping after a step that reduces the error,
+#: and factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: A step is slow if the error after the step is more than this fraction of the error before the step.
+#: A step is slow if this fraction of the error remains.
 _SLOW = 0.99
-#: The iteration ends if a full step would reduce the squared error by at most this fraction.
+#: The iteration ends below this relative reduction of the squared error.
 _LEAST_REDUCTION = 1e-13
-#: The norm of n residuals has a relative rounding error of at most this number times n eps.
+#: The norm of n residuals has this relative rounding error, times n eps.
 _NORM_ROUNDING = 4.0
 
 
@@ -37,12 +37,12 @@ def least_squares(
     max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Search near `start` for the state with the smallest residuals.
+    """Search near `start` for the smallest residuals.
 
-    The function returns this state and the norm of its residuals. `derivatives` returns the negative
-    derivatives (rows, parameters) of the residuals (rows,). A step is a vector (parameters,). The function
-    rejects a step if the absolute value of a component is more than `max_step`. The iteration ends after
-    `patience` consecutive slow steps; 0 means no limit.
+    The result is the best state and the norm of the residuals.
+    `derivatives` returns the negative derivatives (rows, parameters).
+    No component of a step exceeds `max_step`.
+    The search ends after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

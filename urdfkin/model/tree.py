@@ -27,10 +27,9 @@ FloatArray = inputs.FloatArray
 
 
 class FrameName(str):
-    """The name of a frame with a prefix, `link:NAME` or `joint:NAME`.
+    """A frame's name with a prefix.
 
-    `LinkFrame("link:NAME")` always selects the link NAME, and `JointFrame("joint:NAME")` the joint NAME. A
-    plain string "link:NAME" can also be the full name of a link or joint.
+    A plain string "link:NAME" can also be a full name.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
@@ -54,14 +53,12 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
-    """The name of a joint's frame, which is the frame of the joint's child link."""
-
     __slots__ = ()
     prefix = "joint:"
 
 
 def freeze(array: ArrayLike) -> FloatArray:
-    """Return a read-only, C-contiguous float64 copy of `array`; raise InputError for non-numeric data."""
+    """Return a read-only, C-contiguous float64 copy."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
     copy = np.array(array if numeric else inputs.as_floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
@@ -69,14 +66,14 @@ def freeze(array: ArrayLike) -> FloatArray:
 
 
 class JointKind(Enum):
-    """The joint types of the URDF specification; each value is the word used in the file."""
+    """The joint types of a URDF."""
 
     nq: int
     nv: int
-    nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
-    has_axis: bool  #: Whether a joint of this kind rotates about an axis or translates along an axis.
+    nq_pinocchio: int  #: Number of coordinates in Pinocchio; free angles are (cos, sin).
+    has_axis: bool  #: Whether joints of this kind have an axis.
     turns: bool
-    has_limits: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
+    has_limits: bool  #: Whether joints of this kind have position limits.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
         member = object.__new__(cls)
@@ -96,7 +93,12 @@ class JointKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Limits of a joint: `lower`, `upper` in rad or m, `velocity` in rad/s or m/s, `effort` in N m or N."""
+    """The limits of a joint, in rad or m.
+
+    Attributes:
+        velocity: Largest speed, rad/s or m/s.
+        effort: Largest effort, N m or N.
+    """
 
     lower: float
     upper: float
@@ -104,17 +106,17 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
+#: Largest plausible joint angle; some wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value is far outside the limits if both of the following conditions hold.
-#: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
-#: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
-#: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
+#: A joint value is far outside a limit if the excess is above
+#: `_FAR_DISTANCE` (rad or m)
+#: and above `_FAR_FRACTION` times the joint's range.
+#: With only one limit, any excess is far outside.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
 def far_limits(lower: float, upper: float) -> tuple[float, float]:
-    """Return the two values beyond which a joint value is far outside its limits.
+    """Widen the limits by a large margin.
 
     >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
@@ -129,9 +131,9 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint: multiplier * (value of the mimicked joint) + offset.
+    """The rule of a mimic joint.
 
-    The mimicked joint is not a mimic joint.
+    The joint has the value multiplier * q_mimicked + offset.
     """
 
     mimicked_joint: str
@@ -145,17 +147,14 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """One joint and its pose in the parent link.
+    """One joint of a robot.
 
     Attributes:
-        parent: Index of the parent link in `KinematicTree.links`.
-        T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
-            child link's frame is the joint frame after the motion.
-        axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        tilt: Angle (rad) between `axis` and the coordinate axis that Pinocchio uses for the joint; usually 0.
-            If the angle is not 0, urdfkin reports the finding URDF514. urdfkin's kinematics do not depend on
-            the angle. The angle can increase the differences between the results of urdfkin and Pinocchio.
-        lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
+        parent: Index of the parent link.
+        T_parent_joint: Pose at q = 0, m.
+        axis: (3,) unit axis in the joint frame; (1, 0, 0) without axis.
+        tilt: Angle between `axis` and Pinocchio's axis, rad.
+        lock: None unless the user fixed the joint.
     """
 
     name: str
@@ -179,7 +178,7 @@ class Joint:
             )
 
     def __reduce__(self) -> tuple[type[Joint], tuple[Any, ...]]:
-        # Unpickling then calls the constructor, so that `__post_init__` makes the arrays read-only.
+        # Unpickling calls the constructor, which makes arrays read-only.
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
@@ -196,8 +195,11 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
-        # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
+        """Length of the offset from the parent link.
+
+        The displacement of a locked prismatic joint is added.
+        """
+        # hypot avoids squares, which overflow for 1e200 and underflow for 1e-200.
         length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
             length += abs(self.lock.value)
@@ -206,9 +208,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lock:
-    """A joint of the URDF that the user fixed at a value.
+    """A joint that the user fixed.
 
-    `q` (rad or m) is the joint's coordinate; for a mimic joint, the coordinate of the mimicked joint.
+    Attributes:
+        q: Coordinate of the independent joint, rad or m.
     """
 
     joint: Joint
@@ -221,11 +224,11 @@ class Lock:
 
     @property
     def motion(self) -> FloatArray:
-        """Pose (4, 4) of the child link's frame in the joint frame."""
+        """Pose of the child link in the joint frame."""
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # A rotation about a coordinate axis has exact zeros and ones.
+        elif np.count_nonzero(axis) == 1:  # Rotations about coordinate axes have exact zeros and ones.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -240,16 +243,12 @@ class Lock:
 
 @dataclass(frozen=True)
 class KinematicTree:
-    """Links and joints of one robot, in Pinocchio's order.
+    """A robot's links and joints.
 
     Attributes:
-        name: The robot's name.
-        links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
-        joints: All joints, including fixed joints; a joint's parent link always precedes its child link.
-        poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
-
-    A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError. An unknown
-    mimicked joint raises UnknownNameError.
+        links: The link `links[i + 1]` is the child of `joints[i]`.
+        joints: Joints in Pinocchio's order.
+        poses: Named poses, each for some joints.
     """
 
     name: str
@@ -290,7 +289,6 @@ class KinematicTree:
 
     @cached_property
     def floating_joints(self) -> tuple[int, ...]:
-        """Indices of the joints that have a quaternion in `q`."""
         return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
 
     @cached_property
@@ -303,12 +301,14 @@ class KinematicTree:
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Index of each joint's first coordinate in `q`; a mimic joint has the mimicked joint's index."""
+        """First index of each joint in `q`.
+
+        A mimic joint has the mimicked joint's index.
+        """
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Index of each joint's first velocity in `v`; a mimic joint has the mimicked joint's index."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
@@ -321,9 +321,9 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Smallest and largest plausible angles (2, nq) of revolute joints with limits, rad.
+        """Smallest and largest plausible angles, rad.
 
-        The entries of all other coordinates are infinite.
+        Only rotating joints with limits have finite entries.
         """
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
@@ -334,7 +334,7 @@ class KinematicTree:
 
     @cached_property
     def min_implausible_angle(self) -> float:
-        """Smallest absolute value in `plausible_angles`; infinite if no revolute joint has limits."""
+        """Smallest absolute value in `plausible_angles`."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
@@ -359,7 +359,7 @@ class KinematicTree:
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames."""
+        """Unique frame names, root first."""
         names = [self.links[0]]
         for joint, child in zip(self.joints, self.links[1:], strict=True):
             names += [joint.name, child]
@@ -374,12 +374,9 @@ class KinematicTree:
         return tuple(JointFrame.of(joint.name) for joint in self.joints)
 
     def frame_link(self, name: str) -> int:
-        """Return the index of the link that carries the frame `name`.
+        """Return the index of the frame's link.
 
-        A link or joint with exactly this name has priority. If no link or joint has this name, `link:NAME`
-        selects the link NAME, and `joint:NAME` selects the joint NAME. An unknown name raises
-        UnknownNameError. If a link and a joint have this name, the link must be the joint's child link;
-        otherwise, InputError is raised.
+        A full name has priority over a prefix.
         """
         if not isinstance(name, str):
             raise InputError(
@@ -429,7 +426,6 @@ class KinematicTree:
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """Return the link's own name, or a `LinkFrame` if the joint of another link has the same name."""
         name = self.links[link]
         joint = self._joint_index.get(name)
         return name if joint is None or joint + 1 == link else self.link_frames[link]
@@ -437,7 +433,7 @@ class KinematicTree:
     # -- paths ---------------------------------------------------------------------------------------
 
     def path(self, link: int) -> tuple[int, ...]:
-        """Return the indices of the joints between the root and a link, root first."""
+        """Return the joint indices, root first."""
         joints = []
         while link > 0:
             joints.append(link - 1)
@@ -450,7 +446,6 @@ class KinematicTree:
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Add a root link `universe` and a joint `root_joint`; Pinocchio uses the same names."""
     for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
         if name in known:
             raise InputError(
@@ -469,7 +464,10 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Add named poses; store only the values of joints with exactly one coordinate."""
+    """Add named poses.
+
+    Only joints with one coordinate keep their values.
+    """
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
@@ -478,7 +476,10 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
+    """Fix joints at values, rad or m.
+
+    Joints that mimic a fixed joint are fixed too.
+    """
     independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint
@@ -492,12 +493,12 @@ def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Sort the triples (joint, parent link, child link) into a tree in Pinocchio's order."""
+    """Sort triples (joint, parent link, child link) into Pinocchio's order."""
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
-    # With recursion instead of a stack, a chain of 50,000 links would exceed Python's recursion limit.
+    # Recursion would fail for a chain of 50,000 links.
     stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()
@@ -517,7 +518,6 @@ def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """Return the pose (4, 4) with a rotation and an origin (m)."""
     T = np.eye(4)
     if R is not None:
         T[:3, :3] = R
@@ -527,7 +527,6 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
-    """Return whether a matrix (4, 4) is a rigid transform, with a rotation matrix within `tolerance`."""
     return bool(inputs.rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

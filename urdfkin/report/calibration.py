@@ -15,8 +15,8 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
-#: If the user states no noise, the noise is estimated, and the estimate is at least the rounding error.
-#: If `noise_ratio` is then below this number, the report states that the residuals are only rounding errors.
+#: Estimated noise is at least the rounding error.
+#: Below this `noise_ratio`, residuals are only rounding errors.
 _ROUNDING = 0.5
 
 

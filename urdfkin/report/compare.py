@@ -181,13 +181,13 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else format_units(value)
 
 
-#: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
-#: Growth by a smaller factor is normal, because the samples are random.
+#: Growth of the largest disagreement that is a regression.
+#: Random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: A larger disagreement is a regression only if the new disagreement is above this number (in eps * scale).
-#: A single rounding error can cause a disagreement of this size.
+#: A regression needs a disagreement above this number, in eps * scale.
+#: A single rounding error can be this large.
 GROWTH_FLOOR = 2.0
-#: A larger ratio of disagreement to bound is a regression only if the new ratio is above this number.
+#: A regression of the bound ratio needs a ratio above this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Left end of the x axis, in multiples of eps * scale.
-#: Smaller disagreements have no bars; a percentage at the left end of the plot states their share.
+#: Left end of the x axis, in eps * scale.
+#: A percentage there states the share of smaller disagreements.
 _LEFT = 1e-2
-#: Height of the highest bar, relative to the distance between two rows.
+#: Height of the highest bar, relative to the row distance.
 _HEIGHT = 0.82
 
 
@@ -80,7 +80,7 @@ def _draw_row(
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _draw_bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    # A result beyond the range of the plot is drawn as a mark at the plot's right end.
+    # A mark at the right end replaces results beyond the plot.
     if largest is None or largest > right:
         text = "✗ not finite" if largest is None else f"✗ {format_units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}

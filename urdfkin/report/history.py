@@ -35,16 +35,16 @@ from urdfkin.system.files import MAX_BYTES, is_folder, read_bytes, shorten_path
 from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
-#: Maximum number of reports in a history, and maximum number of files in a folder.
+#: Maximum number of reports, and of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
-#: The charts of the page show the latest CHARTED_RUNS runs.
+#: Number of runs in the list of robots.
+#: Number of runs in the charts.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: The HTML page lists at most this number of changes between runs, the latest changes first.
-#: On a terminal, the limit applies to changes and to runs; the option --all removes the limit.
+#: Maximum number of listed changes, the latest first.
+#: On a terminal, --all removes this limit.
 SHOWN = 20
 _MAX_LISTED = 500
-#: Symbol of each verdict on a robot. The key "" is for a run that did not include the robot.
+#: Symbol of each verdict; "" for a run without the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
@@ -118,8 +118,8 @@ HISTORY = DocumentKind(
 )
 
 #: Changes between runs, by the source of the changed robot.
-#: A change has the key None if it concerns a whole run instead of a robot.
-#: Each change is in a pair with the index of the run in which the change was found.
+#: The key None is for changes of a whole run.
+#: Each change has the index of its run.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 

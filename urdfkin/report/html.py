@@ -54,15 +54,15 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
     from urdfkin.robot import Robot
 
-#: The reader can open and close the details of each robot on the page.
-#: If a report has at most this number of robots, the page shows all details at first.
+#: Readers can open and close the details of a robot.
+#: Up to this number of robots, all details are open at first.
 _OPEN = 1
-#: The page shows at first the details of at most this number of robots that are not verified.
+#: Maximum number of unverified robots with open details.
 _FAILURES_OPEN = 20
-#: A report with more robots than this number has no histograms for verified robots.
-#: The histograms of one robot take a second of computing time.
+#: Larger reports have no histograms for verified robots.
+#: The histograms of one robot take a second.
 _MAX_DRAWN = 100
-#: If the details of all robots have more characters than this number, each robot has a separate file.
+#: Above this number of characters, each robot has a separate file.
 MOST = 5_000_000
 
 
@@ -297,7 +297,7 @@ class NotebookView:
         )
 
     def _repr_html_(self) -> str:
-        # The HTML frame may run its own scripts but cannot access the notebook.
+        # The frame runs its scripts, without access to the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Characters that an XML 1.0 file must not contain, not even as a reference such as `&#1;`.
+#: Characters that XML 1.0 forbids, even as references like `&#1;`.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 

@@ -35,7 +35,7 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
-#: Tolerance of rotation matrices and unit axes, because a robot file may have only 6 digits.
+#: Robot files may have only 6 digits.
 _ROUNDED = 1e-5
 
 
@@ -130,7 +130,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
 
 
 _TOLERANCE = 1e-9
-#: Maximum number of results; a double represents all integers up to this number.
+#: Doubles represent all integers up to this number.
 _MOST = 2**53
 
 
@@ -269,7 +269,7 @@ def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     if (ratio > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {ratio:g}"
     if low > high:
-        # A check without results has no bounds: the first number of `bound` is then larger than the second.
+        # Without results, the first bound is larger than the second.
         if ratio or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but the check has a disagreement"
         return

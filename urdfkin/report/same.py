@@ -32,20 +32,20 @@ from urdfkin.report.markdown import table_lines
 from urdfkin.report.words import format_count
 from urdfkin.robot import Robot
 
-#: Maximum number of printed lines for each kind of difference, if the option --all is not given.
+#: Maximum number of printed lines per kind of difference.
 SHOWN = 12
-#: Message for models that differ, if their joints also have different names or a different order.
+#: Message for different models with different joint names or orders.
 GUESSED = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: A distance or angle of at most FACTOR times the bound on rounding errors is not printed.
-#: The factor covers the rounding errors of sums of several terms.
+#: Distances up to FACTOR rounding bounds are not printed.
+#: The factor covers sums of several terms.
 FACTOR = 1.001
-#: Heading of a list of mimicked joints whose range is too large for a mimic joint.
-#: Such a joint can move the mimic joint beyond the limits of the mimic joint.
+#: Heading for mimicked joints with a too large range.
+#: Such a joint moves a mimic joint beyond its limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -343,14 +343,14 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: `HALF` is half the side length of a picture, in units of the SVG.
-#: The drawn robots are `FILLED` times as wide or as high as the picture.
+#: `HALF`: half the side length of a picture, SVG units.
+#: `FILLED`: part of the picture that the robots fill.
 HALF, FILLED = 150.0, 0.9
-#: Maximum length of the scale bar, relative to the side length of a picture.
+#: Maximum length of the scale bar, in side lengths.
 MAX_SCALE_BAR = 0.3
-#: Distance of the scale bar from the lower edge of a picture, in units of the SVG.
+#: Distance of the scale bar from the lower edge, SVG units.
 SCALE_BAR_MARGIN = 6.0
-#: Length of the axes in the close view, relative to the distance between the two frames.
+#: Length of axes in the close view, relative to the frames' distance.
 AXIS_LENGTH = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
@@ -459,7 +459,7 @@ def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # Matrix that projects a point in space to x and y in the picture: x points to the right, y points down.
+    # Projection of a point: x points right, y points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

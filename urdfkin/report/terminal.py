@@ -40,7 +40,7 @@ from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobo
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Minimum width of a terminal for a table with a column for each quantity.
+#: Minimum terminal width for one column per quantity.
 _WIDE = 100
 
 

@@ -74,11 +74,11 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations that determine the generic rank of a Jacobian.
+#: Number of random configurations for the generic rank.
 _RANK_SAMPLES = 3
-#: Internal members that `dir(robot)` leaves out, so that name completion does not offer them.
+#: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "verifier"}
-#: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
+#: Maximum number of float64 values: the bytes fit in 63 bits.
 _MAX_NUMBERS = (2**63 - 1) // 8
 
 
@@ -160,9 +160,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of poses that a USD stage stores in single precision; None for other sources.
+        #: Pose errors of a USD stage in single precision; None without a stage.
         self.single: SinglePrecisionErrors | None = None
-        #: USD path of each link's prim (scene object), for a robot from a USD stage.
+        #: USD path of each link's prim (scene object).
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -175,7 +175,7 @@ class Robot(Displayable):
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copied or unpickled robot has empty caches, and a verifier of its own.
+        # Copies have empty caches and a verifier of their own.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -825,7 +825,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # A subclass of str may print a name differently in error messages. A plain str avoids this.
+        # Subclasses of str may print names differently.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flatten_out(out, (4, 4))
@@ -1682,10 +1682,10 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # For a plain str and the default reference, the key is this str.
-        # The key then contains no enumeration member, because hashing an enumeration member is slow.
-        # Every other key contains the class of `frame`, for example `LinkFrame`.
-        # `LinkFrame("link:a")` is equal to the str "link:a", but the two can name different frames.
+        # The key of a plain str and the default reference is this str.
+        # Hashing an enumeration member is slow.
+        # Every other key contains the class of `frame`.
+        # `LinkFrame("link:a")` equals "link:a", but can name another frame.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

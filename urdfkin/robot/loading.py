@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Findings that help only the author of a URDF file.
-#: If urdfkin generated the URDF from another source, these findings cause no warning.
+#: Findings for the author of a URDF file.
+#: A generated URDF causes no such warnings.
 _FINDINGS_FOR_AUTHORS = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 

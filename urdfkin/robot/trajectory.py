@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of one sample in each array, by the array's name: for example, `(nq,)` for q (n, nq).
+#: Shape of one sample in each array, for example `(nq,)` for q.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -115,9 +115,9 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Minimum number of samples; a second difference needs three.
 _MIN_SAMPLES = 3
-#: Names of the .npz arrays for the pose, the velocity and the acceleration of the root link.
+#: .npz arrays for the pose, velocity and acceleration of the root.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: The user gets a note if the times are rounded by more than this fraction of the smallest time step.
+#: Fraction of the time step; larger rounding of times causes a note.
 _TIME_ROUNDING = 1e-6
 
 
@@ -215,10 +215,10 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # The velocity v is s' * step, and the acceleration a is s'' * step.
-    # Here s' and s'' are the first and the second time derivative of s.
+    # v = s' * step, a = s'' * step.
+    # s', s'': first and second time derivative of s.
     # The same formulas hold for planar and floating joints.
-    # For such a joint, `step` contains the joint's constant twist in the axes of the moving frame.
+    # `step` is the joint's constant twist in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(freeze(t), freeze(q), freeze(s_1 * step), freeze(s_2 * step), "of the line", exact=True)
 
@@ -310,7 +310,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With the time step h, the error of a is proportional to h^order.
+        # The error of a is proportional to h^order, h the time step.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -604,15 +604,15 @@ def _check_columns(
         )
 
 
-#: If the angles of a joint differ by more than this number (rad), the angles are not wrapped.
-#: The number is one turn, plus a margin for angles that are rounded to two decimals.
+#: Angles with a larger difference (rad) are not wrapped.
+#: One turn, plus a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
-#: For example, rotations by 130 and by -230 degrees lead to the same pose.
-#: Above 120 degrees, the longer rotation is less than twice as large as the shorter rotation.
+#: After a larger step (rad), the direction of rotation is uncertain.
+#: Rotations by 130 and by -230 degrees lead to the same pose.
+#: Above 120 degrees, the other rotation is less than twice as large.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.
+#: Larger differences of mimic joints (rad or m) are no rounding errors.
 #: For a multiplier m with |m| > 1, the limit is |m| times this value.
 _MIMIC_ROUNDING = 1e-9
 

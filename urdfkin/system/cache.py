@@ -29,12 +29,12 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_if_exists
 
-#: Version of the checksum; the digest in a folder's name depends on this version.
+#: Version of the checksum, part of the folder's digest.
 _CHECKSUM_VERSION = "sealed with its name"
 _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
-#: Name of a file whose modification time is the last use of the folder.
+#: The modification time of this file is the folder's last use.
 _LAST_USE_FILE = ".used"
-#: Users that may own parent folders: root, and the host's root user in some containers.
+#: Permitted owners of parent folders: root, and the host's root in containers.
 _TRUSTED_OWNERS = (0, 65534)
 
 

@@ -44,9 +44,9 @@ def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Maximum time to wait for a process that opens the other end of a named pipe, s.
+#: Maximum time to wait for a named pipe, s.
 PIPE_TIMEOUT = 10.0
-#: Maximum size of a robot, a table, a settings file or a cached file, bytes.
+#: Maximum size of an input file, bytes.
 MAX_BYTES = 100_000_000
 #: Maximum size of data (trajectories, samples, reports), bytes.
 MAX_DATA_BYTES = 2_000_000_000
@@ -71,7 +71,7 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     """Return the first bytes of a file, at most `count` bytes; `pipes` is as in `read_bytes`."""
     try:
-        # Without O_NONBLOCK, opening a pipe blocks until a writer opens the pipe.
+        # O_NONBLOCK: opening a pipe does not wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         try:
             kind = os.fstat(descriptor).st_mode
@@ -211,7 +211,7 @@ def _read_first_of_pipe(descriptor: int, path: Path) -> bytes:
         # A writer is connected, but has written nothing yet.
         except BlockingIOError:
             return b""
-        # POLLHUP means that a writer has connected and then closed the pipe.
+        # POLLHUP: a writer has connected and closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)
@@ -234,7 +234,7 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        # `Path.replace` also replaces a read-only file, so this check comes first.
+        # `Path.replace` would also replace a read-only file.
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()

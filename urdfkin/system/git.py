@@ -88,7 +88,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # These variables prevent git from fetching, prompting, starting a pager or translating messages.
+    # git must not fetch, prompt, page or translate.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",

@@ -60,12 +60,12 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        # A module may call `register` while another thread imports that module.
+        # Another thread may import the module at the same time.
         if self._registered:
             return
         with self._lock:
             if not self._registered:
-                # `logging` must be imported before the registration; the class docstring says why.
+                # The class docstring explains why `logging` comes first.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

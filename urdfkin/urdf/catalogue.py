@@ -124,7 +124,7 @@ PACKAGE_PATH_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _PACKAGE_NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: Schemes of package addresses. A package address contains a package name and a path in the package.
+#: Schemes of addresses with a package name and a path.
 PACKAGE_SCHEMES = ("package://", "model://")
 
 

@@ -19,10 +19,10 @@ from urdfkin.urdf.confinement import MAX_MEMORY, AllowedPaths, confine, limit_pr
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import find_arguments
 
-#: Functions of xacro that would give an expression access to types and attributes.
+#: Functions of xacro that would reveal types and attributes.
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
-#: An expression that xacro itself evaluates, but that urdfkin refuses.
+#: An expression that urdfkin refuses, although xacro evaluates it.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"

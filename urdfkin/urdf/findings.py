@@ -31,7 +31,7 @@ from urdfkin.errors.escape import escape_unprintable, log_line
 from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
-#: Maximum number of characters of a file that a message quotes.
+#: Maximum number of quoted characters of a file.
 MAX_QUOTE_LENGTH = 60
 
 
@@ -71,7 +71,7 @@ class ExcerptFormatter:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        # A line may be several megabytes long, so it is not decoded again for the next finding on the line.
+        # A line of several megabytes is decoded only once.
         if self.number != finding.line:
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
@@ -93,7 +93,7 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Upper bound (rad) on the error of rounding an angle of at most one revolution to a double.
+#: Maximum rounding error of an angle up to one revolution, rad.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -415,20 +415,20 @@ class CommentIndex:
         return None
 
 
-#: urdfkin suggests similar names for at most this number of misspelt names in a file.
+#: Maximum number of misspelt names with a suggestion.
 MAX_SEARCHES = 20
-#: Limits of one search for similar names: number of names, and number of compared pairs of characters.
+#: Limits of one search: names, and compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: If a code has at least `MIN_FOLDED` warnings or notes, one finding represents all of them.
+#: Number of warnings or notes that become one finding.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: The codes URDF7xx refer to inertials, shapes, meshes and materials, which kinematics does not use.
+#: URDF7xx: inertials, shapes, meshes and materials, without effect on kinematics.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: If many errors have the same code, urdfkin reports at most this number of these errors separately.
+#: Maximum number of separately reported errors with one code.
 MAX_ERRORS_PER_CODE = 100
 
-#: Maximum number of findings with one code and severity that are stored completely.
+#: Maximum number of stored findings per code and severity.
 #: For further findings, only the line numbers are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
@@ -624,8 +624,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Pattern of an attribute value that contains a tab, a line end or a reference such as `&amp;`.
-#: XML parsers replace tabs, line ends and references in attribute values.
+#: An attribute value with a tab, a line end or a reference such as `&amp;`.
+#: XML parsers replace these characters.
 #: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Maximum number of joint names in a finding.
 _MAX_NAMES = 5
 
-#: Placeholder for the XML element in records that do not come from a file.
+#: Placeholder element of records that come from no file.
 _NO_ELEMENT = Element("", {}, None, 0, 0, 0)
 
 
@@ -126,7 +126,7 @@ def _serialize(root: Any) -> str:
             duplicate.text = element.text
             for child in element:
                 # The copy omits comments and processing instructions.
-                # In ElementTree, the tag of a comment or a processing instruction is a function.
+                # In ElementTree, the tag of a comment is a function.
                 if isinstance(child.tag, str):
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
@@ -134,8 +134,8 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Names of Pinocchio's joint classes whose axis is the x, y or z axis of the joint frame.
-#: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
+#: Pinocchio's joint classes about x, y or z.
+#: R: revolute, RUB: revolute without limits, P: prismatic.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -190,9 +190,9 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Name of the link that each joint moves, by the joint's index.
+        #: Link that each joint moves, by the joint's index.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: Name of the link of each converted frame, by the frame's index.
+        #: Link of each converted frame, by the frame's index.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
@@ -276,7 +276,7 @@ class _ModelReader:
             )
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
-            # Some joint classes of Pinocchio 4.1 have no attribute `axis` in Python.
+            # Some joint classes of Pinocchio 4.1 lack the attribute `axis`.
             # The motion subspace S of the joint contains the axis.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular

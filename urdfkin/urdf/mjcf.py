@@ -43,12 +43,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import expand_home, read_start
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
-#: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
+#: Limit of a prismatic joint without limits, m; URDF requires limits.
 SLIDE_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
-#: Number of bytes that are read from a file to find the root element.
+#: Number of bytes that are searched for the root element.
 _SEARCHED_BYTES = 65_536
 
 
@@ -295,7 +295,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_make_alignment_remark(body.name, with_shapes=with_shapes) for body in aligned]
-    # In a file in radians, large limits are not suspicious, because some hinges turn several times.
+    # Some hinges turn several times, so large limits are plausible.
     notes += _check_angle_unit(mujoco, model) if spec.compiler.degree else ()
     return Mjcf(
         tree, model, fused_model, reader.frames, reader.qpos_index, reader.mimic_equalities,
@@ -306,7 +306,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
 def _load_spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # A confined process cannot start threads.
-    # The memory sizes in the file are needed only for dynamics.
+    # Only dynamics needs the memory sizes in the file.
     # The value -1 selects MuJoCo's default sizes.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
@@ -350,7 +350,7 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Lists of MuJoCo's model that kinematics does not use, each with the name of one element.
+#: Lists that kinematics does not use, with a name for elements.
 _SINGULAR = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
@@ -407,8 +407,8 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
         site.material = ""
     for joint in spec.joints:
         # The next loop replaces all inertias by placeholders.
-        # With `align`, MuJoCo would align the frame of a body with the body's inertial frame.
-        # The inertia is only a placeholder, so `align` is switched off.
+        # `align` would align the body frame with the inertial frame.
+        # The inertia is only a placeholder.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)

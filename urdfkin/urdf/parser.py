@@ -56,8 +56,8 @@ UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
-#: UTF-32 must be tested first, because its byte order mark FF FE 00 00 begins with UTF-16's mark FF FE.
+#: First bytes of XML files in UTF-32 and UTF-16.
+#: UTF-32 comes first, because its byte order mark begins with UTF-16's.
 _WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -67,7 +67,7 @@ _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Names of encodings in which ASCII characters have the same bytes as in UTF-8.
+#: Encodings in which ASCII characters are as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
@@ -167,16 +167,16 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Maximum depth of nested elements in older versions of libxml2.
+#: Maximum depth of elements in older versions of libxml2.
 COMMON_DEPTH = 256
 
 #: Number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
-#: If the stored text of an element has at least this many characters, the parser ignores further text.
+#: Maximum number of stored characters of an element's text.
 _MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
-#: Attributes whose value is the name of a link or joint.
+#: Attributes that name a link or joint.
 _NAME_ATTRIBUTES = frozenset({"name", "link", "joint"})
 
 
@@ -246,7 +246,7 @@ class _Builder:
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
-            # If a tag or comment is incomplete, `CurrentByteIndex` is the position of its first byte.
+            # In an incomplete tag, `CurrentByteIndex` is the first byte's position.
             if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
                 found = f"more than {self.limits.markup} bytes without an end"
                 self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
@@ -390,8 +390,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: The message and the remedy (or None) that urdfkin reports for an error of expat.
-#: The keys are expat's own messages, which are less clear.
+#: Message and remedy (or None) for each message of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -513,7 +512,7 @@ class NumberReader:
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Report tabs and line ends between or after numbers: urdfdom refuses these characters."""
-        # expat replaces tabs and line ends in attributes by spaces, so this check reads the raw text.
+        # expat replaces tabs and line ends, so the raw text is read.
         raw_value = self.report.raw_value(element, attribute)
         if raw_value is None or self._is_too_long(
             element, attribute, raw_value, count * self.report.limits.number
@@ -542,7 +541,7 @@ class NumberReader:
         )
 
 
-#: For an attribute of these elements, a message about an invalid number names only the attribute.
+#: Messages name only the attribute of these elements.
 #: For other elements, the message also names the element.
 _ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
@@ -593,7 +592,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: The square of a length between these bounds neither underflows nor overflows.
+#: Squares of lengths in this range neither underflow nor overflow.
 MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
@@ -786,7 +785,7 @@ class JointReader:
             return  # Rule URDF212 reports text between tags.
         message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
-        # A planar joint moves in the XY plane of its frame, independent of the axis.
+        # A planar joint moves in the frame's XY plane.
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
@@ -834,7 +833,7 @@ class JointReader:
 
 _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
-#: Numeric attributes that kinematics does not use, by the tag of the element.
+#: Numeric attributes without effect on kinematics.
 _UNUSED_NUMBERS = {
     "dynamics": ("damping", "friction"),
     "safety_controller": ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"),
@@ -843,7 +842,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    # A name in the file may be several megabytes long, and the cache must not store such a name.
+    # The cache must not store a name of several megabytes.
     return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
 
@@ -857,5 +856,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: A word with more characters is not similar to any tag or attribute of URDF.
+#: Longer words are not similar to any name of URDF.
 _MAX_WORD_LENGTH = 32

@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Maximum depth of nested elements in a URDF that Pinocchio reads.
-#: Pinocchio's XML parser, tinyxml2, counts the document as level 1 and refuses level 500.
+#: Maximum depth of elements that Pinocchio reads.
+#: tinyxml2 counts the document as level 1, and refuses level 500.
 ORACLE_DEPTH = 498
 
 
@@ -41,7 +41,7 @@ class SizeLimits:
 DEFAULT_SIZE_LIMITS = SizeLimits()
 
 
-#: A quoted attribute value in a start tag may contain '>'.
+#: A quoted value in a start tag may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 

@@ -53,7 +53,7 @@ from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
 _MAX_LAYERS = 1_000
-#: In a USD file, a missing limit of a joint is infinity or the largest number in single precision.
+#: A missing limit is infinity or the largest single precision number.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: A frame has shear if the cosine between two axes of the frame exceeds `_MAX_SHEAR` * u * n.
 #: The factor n is the number of prims on the path of the frame's prim.
@@ -75,17 +75,17 @@ _MIMIC_SCHEMAS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
 _MIMIC_RELATIONSHIP = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: A USD type or schema with one of these words in its name couples joints or bodies.
 _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
-#: Suffixes of the type names of joints that a kinematic tree cannot represent.
-#: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
+#: Suffixes of joint types that a kinematic tree cannot represent.
+#: OpenUSD recognizes such types only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: USD attributes for the quadratic, cubic and quartic terms of MuJoCo's joint equality.
-#: A mimic rule of a URDF has no such terms.
+#: Attributes for the nonlinear terms of MuJoCo's joint equality.
+#: URDF mimic rules have no such terms.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
 _SHAPE_GROUPS = ("visual", "visuals", "collision", "collisions")
-#: Rotation matrix that rotates the y axis onto the z axis.
+#: Rotation of the y axis onto the z axis.
 _ROTATION_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 #: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
@@ -253,7 +253,7 @@ def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # If there is no file beside the layer, OpenUSD searches in the current folder.
+        # Without this file, OpenUSD searches in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
@@ -387,7 +387,7 @@ class _StageReader:
     _edges: list[_JointPrim] = field(default_factory=list)
     _joints_read: dict[str, UsdJoint] = field(default_factory=dict)
     _single_precision: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # Pinocchio uses the name `universe` for the world and `root_joint` for the joint of a moving base.
+    # Pinocchio names the world `universe`, and a moving base's joint `root_joint`.
     _link_names: set[str] = field(default_factory=lambda: {"universe"})
     _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _meters_per_unit: float = 1.0
@@ -555,7 +555,7 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction in "physxMimicJoint:rotX:referenceJoint" may differ from the joint's direction.
+            # "physxMimicJoint:rotX:referenceJoint" may name another direction than the joint's.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -567,7 +567,7 @@ class _StageReader:
             if not any(word in schema for word in _COUPLING_WORDS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add nonlinear terms.
+                # MjcEqualityJointAPI may add nonlinear terms to NewtonMimicAPI.
                 if more := [name for name in _NONLINEAR_COEFFICIENTS if self._read_value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._report("left-out-of-usd", path, what)
@@ -621,8 +621,8 @@ class _StageReader:
             return None
         kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
-        # A and B are poses relative to a body, or relative to a world with z up.
-        # `UsdJoint` contains poses relative to a body or to the stage's world, in which y may be up.
+        # A and B: poses relative to a body, or to a world with z up.
+        # `UsdJoint` has poses in the stage's world, in which y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -805,12 +805,12 @@ class _StageReader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # Several groups of connected bodies can belong to one articulation if each is attached to the world.
+        # An articulation may contain several groups that are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
-                continue  # A single body that is fixed to the world is not a robot.
+                continue  # One body that is fixed to the world is no robot.
             self._set_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
         articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
@@ -977,9 +977,9 @@ class _StageReader:
         if (np.eye(4) == B).all():
             yield joint, here, there
             return
-        # In a URDF, the joint frame is also the frame of the child link.
-        # If the frame of the child link differs from the joint frame, the joint moves an additional link.
-        # A fixed joint connects the additional link with the child link.
+        # In a URDF, joint and child link have the same frame.
+        # For another child frame, the joint moves an additional link.
+        # A fixed joint connects it with the child link.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there

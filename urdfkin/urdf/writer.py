@@ -37,7 +37,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint without position limits has no <limit> element if all other limits are infinite.
+    # Joints without finite limits have no <limit> element.
     return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 

@@ -28,10 +28,10 @@ from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
 
-#: Limits of the search for declared arguments: size of a file in bytes, and number of files.
+#: Limits of the search for arguments: bytes per file, and files.
 MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 
-#: Function that returns the folder of a package, or raises LookupError.
+#: Function that returns a package's folder, or raises LookupError.
 FindPackage = Callable[[str], str]
 
 _ARGUMENT_USE = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
@@ -77,7 +77,7 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
     return folder / name
 
 
-#: Maximum time of an expansion in seconds, because a macro may call itself without end.
+#: Maximum time of an expansion, s; macros may call themselves.
 PATIENCE = 60.0
 
 #: Maximum size of the expanded URDF in bytes.

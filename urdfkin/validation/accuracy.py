@@ -48,8 +48,8 @@ from urdfkin.verify.verifier import compute_bound, compute_own_results, oracle_r
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
-#: The study omits the representations by angles about fixed axes.
-#: The Jacobian of such angles has the same rows as a Jacobian of Euler angles, in reverse order.
+#: Representations by angles about fixed axes are omitted.
+#: Their Jacobians have the rows of Euler angles, reversed.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -58,7 +58,7 @@ _REPRESENTATIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Largest error and root mean square of the errors of one library, in eps * scale."""
+    """Largest error and root mean square, in eps * scale."""
 
     worst: float
     typical: float
@@ -66,9 +66,11 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyLine:
-    """Errors of urdfkin and of Pinocchio for one quantity, over `numbers` compared values.
+    """Errors of urdfkin and of Pinocchio for one quantity.
 
-    For analytical Jacobians, `reference` is the representation of the orientation.
+    Attributes:
+        reference: Reference frame; for analytical Jacobians, the representation of the orientation.
+        numbers: Number of compared values.
     """
 
     quantity: str
@@ -80,7 +82,7 @@ class AccuracyLine:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyStudy:
-    """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
+    """Result of the accuracy study of one robot."""
 
     robot: str
     samples: int
@@ -167,10 +169,9 @@ class _AccuracyBatch:
         )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Yield the analytical Jacobians of each representation of the orientation.
+        """Yield the analytical Jacobians of each representation.
 
-        For Euler angles, poses near a singularity are skipped. For quaternions, poses are skipped if the sign
-        of the quaternion is uncertain.
+        Skip Euler angles near a singularity, and quaternions with an uncertain sign.
         """
         poses, J_v = self._compute_samples(PLACEMENT, None), self._compute_samples(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
@@ -202,10 +203,10 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices (n, links, m) of the nonzero columns in the Jacobian of each link.
+    """Return the indices of each link's nonzero Jacobian columns.
 
-    m is the largest number of nonzero columns in a Jacobian. If a Jacobian has fewer nonzero columns, their
-    indices come first, and indices of zero columns follow.
+    Returns:
+        (n, links, m) indices; m is the largest number of nonzero columns. Zero columns fill the rest.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -217,9 +218,11 @@ def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
+    """Return the unit quaternion closer to `near`.
 
-    Both q and -q represent a rotation; the result is the quaternion closer to `near`.
+    Args:
+        R: (m, 3, 3) rotations.
+        near: (m, 4) quaternions.
     """
     K = davenport_matrix(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.
@@ -242,7 +245,10 @@ def _make_line(quantity: str, reference: str | None, compared: Sequence[_Accurac
 
 @partial(np.vectorize, otypes=[float])
 def _error_bound(x: float, true: Number) -> float:
-    """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
+    """Return an upper bound on the error of `x`.
+
+    The interval `true` contains the true value.
+    """
     return float(abs(as_interval(true) - x).upper())
 
 

@@ -31,9 +31,10 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    If `is_transient` is True, the robot is not the cause: the chunk could not be run, or its answer was lost.
-    A transient failure is not stored, so a resumed run computes the chunk again. `error` is the traceback of
-    an unexpected error.
+    Attributes:
+        is_transient: Whether the robot is not the cause, for example if an answer was lost. A resumed run
+            computes the chunk again.
+        error: Traceback of an unexpected error.
     """
 
     verdict: ValidationVerdict
@@ -47,7 +48,7 @@ Answer = ChunkResult | Failure
 
 
 def answer_chunk(chunk: Chunk) -> Answer:
-    """Run a chunk and return its result; every exception except an interrupt becomes a `Failure`."""
+    """Run a chunk; every exception except an interrupt becomes a `Failure`."""
     try:
         return run_chunk(chunk)
     except Exception as error:
@@ -100,12 +101,12 @@ def make_crash_failure(robot_input: RobotInput, reason: str, cause: str) -> Fail
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST_SIZE = hashlib.sha256().digest_size
-#: Maximum size of an unpacked file, bytes; no answer of urdfkin is larger.
+#: Maximum size of an unpacked file, bytes.
 _MAX_BYTES = 2**27
 
 
 class DamagedError(Exception):
-    """A file is damaged or belongs to another chunk; the message states the reason."""
+    """A file is damaged or belongs to another chunk."""
 
 
 def encode_answer(key: str, answer: Answer) -> bytes:
@@ -127,7 +128,7 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return results as the bytes of a file, with key and checksum; doubles can be read back exactly."""
+    """Return the bytes of an answer file; doubles are stored exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 

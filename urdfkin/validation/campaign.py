@@ -42,7 +42,10 @@ if TYPE_CHECKING:
 
 
 class StoreWarning(UserWarning):
-    """A file of a store is damaged or has an unknown name; `validate` computes lost results again."""
+    """A file of a store is damaged or has an unknown name.
+
+    Lost results are computed again.
+    """
 
 
 def validate(
@@ -133,7 +136,7 @@ def validate(
     collector = ResultCollector(
         robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
     )
-    # An executor may run chunks on other machines, and each machine computes its own memory limit.
+    # Each machine computes its own memory limit.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
@@ -147,7 +150,7 @@ def validate(
             if saved is not None:
                 campaign.load_answers(saved)
             for i, error in unread.items():
-                # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
+                # Each unreadable robot gets only one failure.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
             missing = [
@@ -193,7 +196,10 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _can_be_loaded(robot_input: RobotInput) -> bool:
-    """Return whether a robot can be loaded; if not, the robot's first chunk reports the error."""
+    """Return whether a robot can be loaded.
+
+    If not, the robot's first chunk reports the error.
+    """
     try:
         robot_input.load()
     except Exception:
@@ -202,7 +208,7 @@ def _can_be_loaded(robot_input: RobotInput) -> bool:
 
 
 def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; the report of an incomplete store is marked as interrupted."""
+    """Return a store's report; an incomplete run is marked as interrupted."""
     store = Store.open_read_only(Path(folder), _warn)
     store.check_names()
     manifest, robot_inputs = store.manifest, store.manifest.make_robot_inputs()
@@ -232,8 +238,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: If all kernels are on disk, compiled kernels make runs with more than _WORTH_LOADING samples faster.
-#: If kernels are missing on disk, compiling them makes runs with more than _WORTH_COMPILING samples faster.
+#: Above this number of samples, loading kernels from disk saves time.
+#: Above this number of samples, compiling kernels saves time.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

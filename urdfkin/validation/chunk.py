@@ -41,14 +41,14 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
-#: Maximum number of random configurations in one draw; each draw has its own seed.
+#: Maximum number of random configurations in one draw.
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
-#: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
+#: Minimum number of chunks of a robot with 200 or more samples.
 _MIN_CHUNKS = 8
-#: Maximum number of draws in a chunk; a draw has at most DRAW_SIZE random configurations.
-#: For a typical robot, 40 draws take one second and give a few kilobytes of results.
+#: Maximum number of draws in a chunk.
+#: For a typical robot, 40 draws take one second.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -59,8 +59,10 @@ _T = TypeVar("_T")
 class Chunk:
     """A range of samples of one robot.
 
-    `first` is the index of the chunk's first draw, and `samples` is the number of random configurations. The
-    check of the robot may use `memory` bytes; None means half of the machine's free memory.
+    Attributes:
+        first: Index of the first draw.
+        samples: Number of random configurations.
+        memory: Allowed memory, bytes; None: half of the free memory.
     """
 
     robot_input: RobotInput
@@ -99,7 +101,7 @@ class Timings:
     second: float = 0.0
 
     def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function, and add the time of the call (s) to the attribute `part`, such as "urdfkin"."""
+        """Call a function, and add its time to the attribute `part`."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)
@@ -119,10 +121,9 @@ class Timings:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk, or the sum of the results of adjacent chunks of one robot.
+    """Result of a chunk, or the sum of adjacent chunks.
 
-    `summary` describes the robot. Only the first chunk of a robot computes the summary. Without the result of
-    this chunk, `summary` is None.
+    Only the first chunk of a robot computes `summary`.
     """
 
     name: str
@@ -162,7 +163,7 @@ class Chunking:
         return min(_MAX_DRAWS, max(1, -(-self.samples // DRAW_SIZE) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
-        """Number of chunks of a robot: at least one, because the special configurations need a chunk."""
+        """Number of chunks of a robot, at least one."""
         return max(1, -(-self.samples // (self._draws * DRAW_SIZE)))
 
     def chunk(self, robot_input: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
@@ -171,7 +172,7 @@ class Chunking:
         return Chunk(robot_input, seed, index, first, samples, most)
 
     def configurations(self, chunks: range) -> int:
-        """Return the number of samples in a range of chunks, including the special configurations."""
+        """Return the number of samples, including the special configurations."""
         if not chunks:
             return 0
         size = self._draws * DRAW_SIZE
@@ -210,7 +211,7 @@ def compare_frames(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, ErrorStats]:
-    """Return the error statistics of each quantity of a robot in each reference frame."""
+    """Return the error statistics of each quantity."""
     found: dict[Key, ErrorStats] = {}
     work = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_bytes(len(x.q), robot.nv)):
@@ -232,9 +233,9 @@ class _ComparisonBatch:
 
 
 class _Block(_ComparisonBatch):
-    """Comparison of urdfkin's results for a block of frames with the results of the oracles.
+    """Comparison of a block of frames with the oracles.
 
-    Results for a joint are compared in the block of the joint's child link.
+    A joint belongs to the block of its child link.
     """
 
     def __init__(
@@ -248,19 +249,18 @@ class _Block(_ComparisonBatch):
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
-        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
-        # In the list of frames, the links come first, beginning with the root.
+        # A joint and its child link have the same Jacobian.
+        # The links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Yield error statistics for the frames and the joints of the block.
+        """Yield error statistics for the frames and joints.
 
-        The frame of a joint is the frame of its child link, so urdfkin computes one result for both.
-        Pinocchio has different functions for joints and for links. Therefore, urdfkin's result is compared
-        with the results of both functions.
+        A joint and its child link have the same frame. Pinocchio has different functions for joints and
+        links, so both results are compared.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():
@@ -306,7 +306,7 @@ class _Block(_ComparisonBatch):
 class _Screws(_ComparisonBatch):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
-    Each column of `data.J` equals a column of one joint's Jacobian in the reference frame WORLD.
+    Each column of `data.J` is a joint's Jacobian column in WORLD.
     """
 
     def compare(self) -> Iterator[ErrorStats]:
@@ -342,10 +342,7 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert configurations of a tree with mimic joints to configurations of the tree `free`.
-
-    In the tree `free`, the same joints have no mimic rules, so each mimic joint has its own coordinates.
-    """
+    """Convert q to configurations of a tree without mimic rules."""
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]
@@ -356,8 +353,8 @@ def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> Fl
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: The cache contains only the latest robot. A worker gets the chunks of a robot one after another.
-#: Two large robots in the cache would need too much memory.
+#: The cache contains only the latest robot.
+#: Two large robots would need too much memory.
 _cache: dict[RobotInput, _Models] = {}
 
 

@@ -38,18 +38,18 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _PER_THREAD * threads + _MORE chunks are sent and not answered at any time.
-#: The number of threads is the sum over all workers.
-#: The limit is high enough that every thread always has a next chunk.
+#: Maximum number of unanswered chunks: _PER_THREAD * threads + _MORE.
+#: `threads` is the sum over all workers.
+#: Every thread then always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
-#: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: A high number is safe, because a robot cannot crash a Dask worker.
+#: Maximum number of times that a chunk is sent.
+#: A high number is safe: robots cannot crash Dask workers.
 #: The worker runs each chunk in a separate process.
 _TRIES = 20
-#: Seconds after which the number of workers is read again.
+#: Interval for counting the workers, s.
 _INTERVAL = 1.0
 #: The scheduler does not need these packages.
-#: If the scheduler has one of the packages, the package must have the same version as in this process.
+#: Packages of the scheduler that need the same version as here.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -62,12 +62,13 @@ class ClusterError(UrdfkinError, RuntimeError):
 def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
-    `scheduler` is the address of a running scheduler, such as `tls://host:8786`, or `local:N` for N workers
-    on this machine. Local workers open no port, and stop when the context ends. `tell` receives messages for
-    the user.
+    Args:
+        scheduler: Address of a scheduler, such as `tls://host:8786`, or `local:N` for N local workers. Local
+            workers open no port, and stop when the context ends.
+        tell: Function that receives messages for the user.
 
-    Raise ClusterError if no scheduler answers, if a worker cannot run urdfkin, or if the cluster and this
-    process have different versions or code.
+    Raises:
+        ClusterError: no scheduler answers, a worker cannot run urdfkin, or versions or code differ.
     """
     with _client(scheduler) as client:
         _check_versions(client)
@@ -115,9 +116,9 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class of a scheduler and a worker that do not start Dask's web server.
+    """A scheduler or worker without Dask's web server.
 
-    Every user of the machine could read the pages of the web server.
+    Every user of the machine could read the web server's pages.
     """
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
@@ -133,11 +134,10 @@ class _ClusterWorker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """Yield a scheduler and workers that run in this process and open no port.
+    """Yield a scheduler and workers without an open port.
 
-    Dask adds its scratch folders to the front of `sys.path`, so another user could place modules there. Two
-    measures prevent this: only the current user can access the scratch folders, and this function removes the
-    folders from `sys.path` at once.
+    Dask adds its scratch folders to `sys.path`, so another user could place modules there. Therefore, only
+    the current user can access these folders, and this function removes them from `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -166,9 +166,9 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if a worker or the scheduler has other versions than this process.
+    """Raise ClusterError if a worker or scheduler has other versions.
 
-    Call this function before any data are sent to the cluster.
+    Call this function before any data are sent.
     """
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
@@ -209,9 +209,9 @@ class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
         #: Sent chunks without an answer.
-        #: Each value contains the task of the chunk and the number of times that the chunk was sent.
+        #: Task of each chunk, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: For each robot, a future of the text that describes the robot. The workers store this text.
+        #: Text of each robot, stored on the workers.
         self._robots: dict[int, Future[bytes]] = {}
         #: Number of chunks without an answer for each robot.
         self._in_use = Counter[int]()
@@ -267,17 +267,14 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Reduce the number of the robot's unanswered chunks by one.
-
-        If the number is then 0, delete the robot's text on the workers.
-        """
+        """Delete the robot's text on the workers after its last answer."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
             self._robots.pop(robot, None)
 
     def _take_answer(self, future: Future[Any], task: Task, tries: int) -> Answer | None:
-        """Return the answer of a finished chunk; None if the chunk must be sent again."""
+        """Return the answer; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()

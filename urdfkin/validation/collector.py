@@ -27,10 +27,10 @@ class CampaignProgress:
     """Progress of a campaign.
 
     Attributes:
-        robots_done: Number of robots that are complete or failed.
+        robots_done: Number of complete or failed robots.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: Number of finished chunks from an earlier run.
-        failures: Number of robots that already have a disagreement, or that could not be checked.
+        failures: Number of robots with a disagreement or without a check.
     """
 
     robots_done: int
@@ -48,7 +48,8 @@ Progress = Callable[[CampaignProgress], None]
 class ResultCollector:
     """Collect the answers of a run for each robot.
 
-    For each robot, `parts` contains the range of chunks to run.
+    Attributes:
+        parts: Range of chunks to run, for each robot.
     """
 
     def __init__(
@@ -68,10 +69,7 @@ class ResultCollector:
             self._progress(self.state(self._robot_inputs[0].label if self._robot_inputs else ""))
 
     def add(self, task: Task, answer: Answer, *, from_earlier_run: bool = False) -> None:
-        """Add an answer, and report the progress.
-
-        `from_earlier_run` is True if an earlier run computed the answer.
-        """
+        """Add an answer, and report the progress."""
         robot = self._robots[task.robot]
         was_complete, had_failed, before = robot.is_complete, robot.has_failed, robot.done
         robot.add(task.chunk.index, answer)
@@ -129,10 +127,7 @@ class _RobotAnswers:
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
-        """Store the result of a range of chunks.
-
-        If a stored result belongs to the chunks directly before or after, store the sum of the results.
-        """
+        """Store a result, and add it to adjacent results."""
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1
@@ -160,8 +155,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # If chunks failed, the report contains only the results of the chunks before the first failed chunk.
-        # Which later chunks are finished depends on the speed of the workers.
+        # The report contains the results before the first failed chunk.
+        # The finished later chunks depend on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]
@@ -196,7 +191,10 @@ def _verdict(
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
-    """Return the verdict on a robot and its reasons; a disagreement takes precedence."""
+    """Return the verdict on a robot and its reasons.
+
+    A disagreement takes precedence over a failure.
+    """
     disagreements = [*_outside(error_stats), *summary.disagreements]
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:

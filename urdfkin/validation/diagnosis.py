@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains the user's results if `Diagnosis.remainder` is at most this number.
+#: Largest `Diagnosis.remainder` that explains the user's results.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
-#: A fast first test for exchanged joints uses only this number of configurations.
-#: If an exchange of two joints explains these results, a second test uses all configurations.
+#: Number of configurations in a fast first test for exchanged joints.
+#: A second test then uses all configurations.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
-#: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
+#: Numbers are equal within _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
-#: Indices that change the rows [linear; angular] of a result to [angular; linear], and vice versa.
+#: Indices that exchange the linear and the angular rows.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -63,12 +63,14 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the user's largest error that a supposed mistake does not explain.
+        """Return the unexplained fraction of the user's largest error.
 
-        `predicted` contains urdfkin's results after the mistake was applied to them. The fraction is the
-        largest difference between the user's results and `predicted`, divided by the largest difference
-        between the user's results and urdfkin's results. If n is given, `predicted` and the fraction are
-        only for the first n configurations.
+        Args:
+            predicted: urdfkin's results with a supposed mistake.
+            n: Use only the first n configurations.
+
+        Returns:
+            max |actual - predicted| / max |actual - expected|.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -111,14 +113,14 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A common mistake: a sentence that describes the mistake, and a function without arguments.
-#: The function applies the mistake to urdfkin's results, and returns the changed results.
+#: A common mistake: a sentence, and a function without arguments.
+#: The function returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
 @dataclass(frozen=True)
 class Mistakes:
-    """Common mistakes in a user's function, which computes a quantity of a frame."""
+    """Common mistakes in a user's function."""
 
     robot: Robot
     row: Quantity
@@ -254,9 +256,10 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is_angle) for each independent joint with one coordinate.
+        """Return the independent joints with one coordinate.
 
-        The indices apply to the vectors q and v that the user's function receives.
+        Returns:
+            (name, index in q, index in v, is_angle) of each joint, in the function's convention.
         """
         tree = self.robot.tree
         found = []
@@ -273,10 +276,10 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Return a copy of the inputs, in which the numbers of some joints are multiplied by `factor`.
+        """Multiply the numbers of some joints by `factor`.
 
-        `at` has a pair for each joint: the index in q, and the index in v and a. For `count` 1, only q
-        changes; for 2, q and v change; for 3, q, v and a change.
+        `at` contains the index in q, and the index in v and a, of each joint. If `count` is 1, only q
+        changes; if 2, q and v; if 3, q, v and a.
         """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
@@ -418,9 +421,10 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield a sentence for each wrong column that has the opposite sign, is zero, or equals another column.
+    """Yield a sentence for each column with a simple mistake.
 
-    Each sentence is in a pair with the number 0.0, which replaces `Diagnosis.remainder`.
+    Examples are the opposite sign, zeros, or the values of another column. The number 0.0 in each pair
+    replaces `Diagnosis.remainder`.
     """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return

@@ -21,7 +21,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks in an executor's queue: enough for many workers, and few enough to save memory.
+#: Maximum number of chunks in an executor's queue.
 IN_FLIGHT = 512
 
 
@@ -33,7 +33,7 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Function that an engine calls with a task and its answer. A task has at most one answer.
+#: Callback for a task and its answer, at most once per task.
 AnswerCallback = Callable[[Task, Answer], None]
 
 
@@ -61,7 +61,7 @@ class ExecutorEngine:
         self._executor = executor
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        """Run the tasks; an error that the executor raises becomes the result of the robot."""
+        """Run the tasks; an error of the executor is reported as a failure."""
         waiting, failed = chain.from_iterable(work), set[int]()
         submitted = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)
@@ -102,7 +102,9 @@ def _result(future: Future[Answer]) -> Answer:
 class RobotTasks:
     """Iterator over the tasks of a robot.
 
-    `robot` is the index of the robot, and `index` is the index of the latest chunk. Both are -1 at first.
+    Attributes:
+        robot: Index of the robot, -1 at first.
+        index: Index of the latest chunk, -1 at first.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -122,7 +124,10 @@ class RobotTasks:
 
 
 class WorkQueue:
-    """Distribute tasks among workers; if `shared`, several workers may work on the same robot."""
+    """Distribute tasks among workers.
+
+    If `shared` is true, several workers may validate the same robot.
+    """
 
     def __init__(self, work: Work, *, shared: bool = True) -> None:
         self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
@@ -131,9 +136,9 @@ class WorkQueue:
         self._removed_robots = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, and the iterator over the remaining tasks of the task's robot.
+        """Return a task for an idle worker; None if there is none.
 
-        Robots that no worker has started come first. Return None if there is no task for the worker.
+        Robots that no worker has started come first.
         """
         for tasks in self._waiting:
             self._started_robots.append(tasks)
@@ -145,7 +150,10 @@ class WorkQueue:
         return None
 
     def next(self, tasks: RobotTasks) -> Task | None:
-        """Return the next task of a robot. Return None if the robot has no more tasks or was removed."""
+        """Return the next task of a robot.
+
+        Return None after the last task, or if the robot was removed.
+        """
         task = next(tasks, None)
         if task is None or task.robot in self._removed_robots:
             if tasks in self._started_robots:

@@ -24,13 +24,17 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_disagreements
 
-#: The libraries of a cross check, in the order of the columns of tables.
+#: The libraries of a cross check, in the order of columns.
 CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library's results with results of the second oracle; `worst` is in eps * scale."""
+    """Comparison of one library with the second oracle.
+
+    Attributes:
+        worst: Largest disagreement, in eps * scale.
+    """
 
     failed: int = 0
     worst: float = 0.0
@@ -46,13 +50,12 @@ class OraclePair:
 
 @dataclass(frozen=True, slots=True)
 class CrossCheck:
-    """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
+    """Comparison of urdfkin, Pinocchio and a second oracle.
 
     Attributes:
-        alone: Numbers of results for which one library differs and the other two agree. The numbers belong to
-            the libraries in the order of `CROSS_CHECKED`.
-        undecided: Number of results without a majority. For such a result, either all three pairs of
-            libraries disagree, or exactly one pair disagrees.
+        by: Name of the second oracle.
+        alone: For each library in `CROSS_CHECKED`, the number of results in which only this library differs.
+        undecided: Number of other results with a disagreement.
     """
 
     by: str
@@ -87,10 +90,10 @@ def make_cross_check(
     first: Bound,
     second: Bound,
 ) -> CrossCheck:
-    """Compare the results (n, frames, ...) of urdfkin, Pinocchio and the second oracle in pairs.
+    """Compare urdfkin, Pinocchio and the second oracle in pairs.
 
-    The argument `first` bounds the difference between urdfkin and Pinocchio. The argument `second` bounds the
-    difference between urdfkin and the second oracle.
+    The results have the shape (n, frames, ...). `first` bounds the difference between urdfkin and Pinocchio.
+    `second` bounds the difference between urdfkin and the second oracle.
     """
     if not results.size:
         return CrossCheck(by, OraclePair(), OraclePair())
@@ -120,13 +123,13 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale, as a bound with the factor k of `second`."""
+    """Add two bounds; the sum has the factor k of `second`."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
 
 
-#: Edges of the histogram of disagreements, in eps * scale: ten bins per decade from 0.001 to 100,000.
+#: Edges of the histogram, in eps * scale: ten bins per decade.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 #: Key of error statistics: the quantity and the reference frame.
 Key = tuple[str, str]
@@ -135,9 +138,11 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """Sample with the largest `bound_ratio` (disagreement / bound).
+    """Sample with the largest `bound_ratio`.
 
-    `units` is the disagreement in eps * scale.
+    Attributes:
+        units: Disagreement, in eps * scale.
+        bound_ratio: Disagreement divided by the bound.
     """
 
     bound_ratio: float
@@ -189,7 +194,7 @@ class ErrorStats:
         )
 
     def join_frames(self, other: ErrorStats) -> ErrorStats:
-        """Return the statistics for all frames of `self` and `other`; both must have the same samples."""
+        """Join the statistics of different frames for the same samples."""
         joined = replace(self, worst_by_frame=()) + replace(other, worst_by_frame=())
         return replace(joined, worst_by_frame=self.worst_by_frame + other.worst_by_frame)
 
@@ -200,7 +205,7 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram, with an error of at most the width of a bin."""
+    """Return a percentile; the error is at most one bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -220,7 +225,10 @@ def compute_error_stats(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> ErrorStats:
-    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample."""
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio.
+
+    `inputs` contains q, v and a of each sample.
+    """
     n, count = results.shape[:2]
     if not results.size:
         return ErrorStats(

@@ -44,15 +44,15 @@ if TYPE_CHECKING:
 _BATCH_SIZE = 256
 #: Number of configurations in a diagnosis.
 _DIAGNOSIS_SAMPLES = 48
-#: Maximum number of stored messages about exceptions and wrong shapes.
+#: Maximum number of stored error messages.
 _MAX_MESSAGES = 5
-#: A relative difference up to this value can be the effect of rounding to single precision.
+#: Largest relative difference that single precision can cause.
 _SINGLE_PRECISION = 1e-5
 
 
 @dataclass(frozen=True)
 class FunctionError:
-    """An exception of the user's function, or a result that is not a real array of the expected shape."""
+    """The user's function failed, or returned an invalid result."""
 
     sample: int
     message: str
@@ -77,10 +77,7 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Describe the worst number of this result.
-
-        The worst number has the largest ratio of difference to bound.
-        """
+        """Describe the number with the largest ratio of difference to bound."""
         with np.errstate(all="ignore"):
             over = np.abs(self.actual - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -214,7 +211,7 @@ class FunctionCheck(Displayable):
         return TextDocument(f"{self.function}: {verdict} on the {of} of {self.robot}", parts)
 
     def _list_first_errors(self) -> Iterator[str]:
-        """Yield a line for each different message in `first_errors`, with the indices of its samples."""
+        """Yield each different message with the indices of its samples."""
         for message in dict.fromkeys(error.message for error in self.first_errors):
             samples = [str(error.sample) for error in self.first_errors if error.message == message]
             yield f"  sample{'s' if len(samples) > 1 else ''} {', '.join(samples)}: {message}"
@@ -235,7 +232,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier that stores the latest call of each quantity."""
+    """A wrapper of a verifier that stores the latest calls."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -336,15 +333,14 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """The results of the user's function and of urdfkin for a batch of configurations.
+    """The results of a user's function and of urdfkin.
 
     Attributes:
-        valid_indices: Indices of n configurations. For these configurations, the user's function returned a
-            result of the right shape.
-        actual: The function's results (n, ...).
-        expected: urdfkin's results (n, ...).
-        scale: The bound on a difference is k * eps * scale. Each number in `expected` has a scale.
-        k: (n,) the factor k of the bound, one for each configuration.
+        valid_indices: Indices of the n configurations with a valid result.
+        actual: (n, ...) results of the function.
+        expected: (n, ...) results of urdfkin.
+        scale: Scale of each number. The bound is k * eps * scale.
+        k: (n,) factor of the bound.
     """
 
     first: int
@@ -431,7 +427,7 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Return urdfkin's results for inputs in the function's convention, without a check."""
+        """Return urdfkin's results in the function's convention."""
         native_inputs = self._native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
@@ -507,7 +503,7 @@ class _Run:
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Convert the scale of a bound to the function's convention.
 
-        Each number of the converted result is a sum of numbers in urdfkin's convention.
+        Each converted number is a sum of urdfkin's numbers.
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
@@ -532,12 +528,12 @@ class _Run:
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
         """Return a bound on the rounding error of the conversion, in eps * scale.
 
-        A conversion that only reorders numbers has no rounding errors. A conversion that computes, for
-        example degrees from radians, rounds each joint angle. The rounded angle differs from urdfkin's angle
-        by up to 2 eps |q|, so the joint's rotation matrix has an error of up to 2 eps |q|. Each term of the
-        result is a product of `factors` vectors. Each joint may rotate each of these vectors. The error of a
-        vector is therefore at most the sum of the errors of all rotation matrices. The matrix that converts
-        the velocities of a planar or floating joint adds at most 16 rounding errors.
+        Reordering has no rounding errors. Computed angles, for example degrees from radians, are rounded:
+
+            error of an angle and of its rotation matrix <= 2 eps |q|
+            error of a vector <= sum of the errors of all rotation matrices
+            term of a result: product of `factors` vectors
+            velocity conversion of a planar or floating joint: <= 16 eps
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -550,8 +546,8 @@ class _Run:
     ) -> tuple[FloatArray, list[int]]:
         """Call the user's function for a batch of configurations.
 
-        Return the results that have the right shape, and the indices of the configurations with such a
-        result.
+        Returns:
+            The valid results, and the indices of their configurations.
         """
         n = len(inputs[0])
         if self.batch:
@@ -683,7 +679,7 @@ def _call(
 ) -> FloatArray | None:
     """Call the function, and return a copy of the result.
 
-    If the call fails or the result is not valid, add a message to `total` and return None.
+    After an error, add a message to `total` and return None.
     """
     try:
         result = function(*inputs)

@@ -18,38 +18,35 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum number of bytes of one array with the results of a block of frames.
-#: At most _ARRAYS such arrays are in memory at the same time.
+#: Maximum size of one array of results, bytes.
+#: At most _ARRAYS such arrays exist at the same time.
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
+#: Workspace of Pinocchio 4.1.0: _PER_CUBE * nv^3 + _PER_LINK * links, bytes.
 #: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
+#: Maximum number of arrays in memory at the same time.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
 
 
 def limit(processes: int = 1) -> int | None:
-    """Return how many bytes each process of a validation may use; None if the free memory is unknown."""
+    """Return the memory limit per process, bytes; None if unknown."""
     free = min(_free(), default=None)
     return None if free is None else int(_FRACTION * free / processes)
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the size in bytes of the largest array for one frame and `samples` samples.
-
-    The largest array contains the Jacobians. If nv is at most 2, the largest array contains the placements.
-    """
+    """Return the size of the largest array for one frame, bytes."""
     return samples * 8 * max(16, 6 * nv)
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`.
+    """Divide `count` items into slices of at most `BLOCK_BYTES`.
 
-    A slice contains at least one item, even if the item is larger. For zero items, yield one empty slice.
+    A larger item has a slice of its own. For zero items, yield one empty slice.
     """
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
@@ -57,7 +54,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def estimate_bytes(tree: KinematicTree, samples: int) -> int:
-    """Estimate the largest memory (bytes) that the comparison of a robot's results needs."""
+    """Estimate the memory for a comparison, bytes."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
     return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
@@ -76,7 +73,7 @@ def check(tree: KinematicTree, samples: int, most: int | None) -> None:
 
 
 def _free() -> Iterator[int]:
-    """Yield the free memory in bytes: of the machine, of each control group, and of this process."""
+    """Yield the free memory of machine, control groups and process, bytes."""
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -93,7 +90,7 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free bytes of a control group and of each parent group, because all limits apply.
+    """Yield the free memory of a control group and its parents, bytes.
 
     In a container, the highest visible control group is the container's own group.
     """
@@ -104,7 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
-            # The kernel counts cached files as used memory, but frees inactive cached files on demand.
+            # The kernel frees inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum number of quoted bytes of the program's standard error.
+#: Maximum number of quoted bytes of standard error.
 _MAX_ERROR_BYTES = 300
-#: Number of consecutive failures after which the program is not started again.
+#: Maximum number of consecutive failures.
 _MAX_FAILURES = 3
 _DAY = 86400.0
 
@@ -149,7 +149,7 @@ class Program:
             answer = self._parse_answer(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A delayed answer would be read as the answer to the next request.
+            self._stop()  # A delayed answer would belong to the wrong request.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):
@@ -179,7 +179,7 @@ class Program:
                 stream.close()
 
     def _ask(self, request: bytes) -> bytes:
-        """Write a request, and return the answer's line; the timeout covers writing and reading."""
+        """Write a request and read the answer, within the timeout."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -224,9 +224,9 @@ class Program:
 
     @staticmethod
     def _parse_answer(line: bytes) -> dict[str, object]:
-        """Parse the program's answer.
+        """Return the answer as a dictionary.
 
-        Raise ProgramError unless the answer contains an entry `result`, or an entry `error` that is a text.
+        Raise ProgramError unless the answer has a `result`, or an `error` that is a text.
         """
         try:
             answer = json.loads(line)

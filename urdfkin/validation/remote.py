@@ -21,10 +21,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run` for a chunk: a pair of a word and data.
-#: "answer": the chunk was computed; the data are the pickled answer.
-#: "died": the chunk crashed two processes; the data name the signal or exit status of the second crash.
-#: "other code": the worker's versions or digests differ from the client's; the data are the worker's.
+#: Return value of `run`: a word and data.
+#: "answer": the pickled answer of the chunk.
+#: "died": signal or exit status of the second crash.
+#: "other code": different versions or digests of the worker.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -36,14 +36,17 @@ _lock = threading.Lock()
 
 
 def store_robot(robot: bytes) -> bytes:
-    """Store a robot's text on a worker. If the worker is lost, Dask calls this function on another worker."""
+    """Store a robot's text on a worker.
+
+    If the worker is lost, Dask calls this function on another worker.
+    """
     return robot
 
 
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
-    """Run a pickled chunk in a process; `client_provenance` contains the client's versions and digests.
+    """Run a pickled chunk in a process.
 
-    If the versions or digests of this machine differ from the client's, the chunk is not run.
+    If the versions or digests differ from the client's, the chunk is not run.
     """
     if client_provenance != provenance():
         return "other code", provenance()
@@ -63,11 +66,11 @@ def end_idle() -> None:
 
 
 class _CrashError(Exception):
-    """The process that ran a chunk crashed; the message states the signal or the exit status."""
+    """The process that ran a chunk crashed."""
 
 
 class _Parcel:
-    """A pickled robot and a pickled chunk. Unpickling a parcel gives the chunk with its robot."""
+    """A pickled robot and chunk; unpickling returns the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -82,9 +85,9 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _idle_or_new() -> WorkerProcess:
-    """Return an idle process; without an idle process, start a process.
+    """Return an idle process, or start a process.
 
-    The robot of the next chunk may already be in the memory of an idle process.
+    An idle process may already have loaded the robot.
     """
     with _lock:
         while _idle:

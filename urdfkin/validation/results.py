@@ -39,7 +39,7 @@ LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package 
 
 @cache
 def provenance() -> dict[str, str]:
-    """Return the versions of `LIBRARIES`, a digest of urdfkin's code, and a digest of the equations.
+    """Return library versions, and digests of code and equations.
 
     The digest of the code does not include the packages in `_DISPLAY`.
     """
@@ -103,7 +103,7 @@ class RobotReport:
         if (case := self.error_stats[key].case) is None:
             return None
         row = QUANTITIES[quantity]
-        # The prefix "joint:" is needed because a link may have the same name.
+        # A link may have the same name as a joint.
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
@@ -212,8 +212,7 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The commands that repeat the run, one on each line.
 
-        Robots with the same options share a command. If the user passed a robot as text, a command must read
-        this robot from standard input. A command can read only one such robot.
+        Robots with the same options share a command. A command can read only one robot from standard input.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(

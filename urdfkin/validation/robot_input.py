@@ -62,7 +62,7 @@ class RobotInput:
         return self.origin.source
 
     def text(self) -> UrdfText:
-        """Return the robot's text; raise InputError if the file has changed since the validation began."""
+        """Return the robot's text; an InputError reports a changed file."""
         if isinstance(self.source, bytes):
             return UrdfText(self.source, self.file, self.label, catalogue().get(self.label))
         text = read_source(self.source)
@@ -75,7 +75,7 @@ class RobotInput:
         return text
 
     def with_text(self) -> RobotInput:
-        """Return a copy that contains the robot's text, so that another machine does not need the file."""
+        """Return a copy that contains the text, for other machines."""
         text = self.text()
         return replace(self, source=text.data, file=text.label)
 
@@ -91,11 +91,14 @@ class RobotInput:
                 source_findings=self.listed,
                 is_generated=self.made,
             )
-        robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
+        robot.verifier.origin = self.origin  # The origin names the original file.
         return robot
 
     def load(self) -> Robot:
-        """Return the robot; raise OracleError if Pinocchio refuses the file or reads a different robot."""
+        """Load the robot; an OracleError reports a refusal by Pinocchio.
+
+        The error also occurs if Pinocchio reads a different robot.
+        """
         robot = self.read()
         if robot.verifier.known_refusal is not None:
             raise OracleError(robot.verifier.known_refusal, where=self.label)

@@ -81,9 +81,9 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
 
 
 def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
-    """Return the part of a joint's range in which the joint's mimic joints are within their limits.
+    """Return the range in which all mimic joints are within their limits.
 
-    Return None if the mimic joints are within their limits in the joint's whole range.
+    None means the joint's whole range.
     """
     if narrowed is None:
         return None
@@ -91,16 +91,16 @@ def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
     return {"lower": lower, "upper": upper, "by": narrowed.mimic_joints}
 
 
-#: Maximum number of chains in a summary; `urdfkin dh --all` lists all chains.
+#: Maximum number of chains in a summary.
 MOST = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
-    """Return the chains with their Denavit-Hartenberg tables, as plain data for JSON.
+    """Return the chains and their DH tables, as plain data.
 
-    The oracle Pinocchio checks the tables. If `oracle` is None, the tables are not checked.
+    Without an oracle, the tables are not checked.
     """
     found = []
     for limb, base, tip in _chains(robot):

@@ -58,17 +58,17 @@ if TYPE_CHECKING:
 
 #: Name and version of the layout of a store.
 _LAYOUT = "urdfkin-campaign/1"
-#: Maximum number of differences between two campaigns that an error lists.
+#: Maximum number of listed differences between two campaigns.
 _MAX_DIFFERENCES = 4
 _MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
 _SCRATCH = ".writing"
 #: File with the settings of the accuracy study.
 _STUDY_FILE = "accuracy.json"
-#: Suffix of a file with the accuracy result of a robot.
+#: Suffix of files with accuracy results.
 _STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
-#: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
+#: Number of attempts to acquire a lock, 0.1 s apart.
 _TRIES = 10
 
 _T = TypeVar("_T")
@@ -78,10 +78,11 @@ Notify = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign; `started` is the start time, ISO 8601, UTC.
+    """Definition of a campaign.
 
-    For each robot, `robots` contains the origin and the sha256 of the text. If the text is unreadable, the
-    sha256 is empty.
+    Attributes:
+        started: Start time, ISO 8601, UTC.
+        robots: Origin and sha256 of each robot; the sha256 of an unreadable text is empty.
     """
 
     robots: tuple[tuple[Origin, str], ...]
@@ -102,7 +103,7 @@ class Manifest:
         return Chunking(self.samples)
 
     def make_robot_inputs(self) -> list[RobotInput]:
-        """Return the robots without their texts, which a report does not need."""
+        """Return the robots without their texts."""
         return [RobotInput(origin.source, origin, sha256) for origin, sha256 in self.robots]
 
     def key(self, robot: int, index: int) -> str:
@@ -160,7 +161,8 @@ def _describe_robot(robot: tuple[Origin, str]) -> str:
 class Store:
     """A folder that contains the results of a validation.
 
-    `scratch` is a folder for unfinished files. If `scratch` is None, the store can only be read.
+    Attributes:
+        scratch: Folder for unfinished files; None: the store is read-only.
     """
 
     folder: Path
@@ -170,7 +172,7 @@ class Store:
 
     @classmethod
     def open_read_only(cls, folder: Path, notify: Notify) -> Store:
-        """Return a read-only store; another process may be writing to the same folder."""
+        """Return a read-only store; another process may write to its folder."""
         path = folder / _MANIFEST
         return cls(folder, Manifest.from_json(read_bytes(path), str(path)), notify)
 
@@ -179,7 +181,7 @@ class Store:
         return self.read_entry(key, _DONE, decode_answer) or self.read_entry(key, _FAILED, decode_answer)
 
     def read_entry(self, key: str, kind: str, decode: Callable[[str, bytes], _T]) -> _T | None:
-        """Return the decoded content of a file; None if the file is missing or damaged."""
+        """Return the content of a file; None if missing or damaged."""
         path = self._path_of(key, kind)
         try:
             content = read_if_exists(path)
@@ -190,7 +192,7 @@ class Store:
             return None
 
     def write_answer(self, robot: int, index: int, answer: Answer) -> None:
-        """Write an answer; when this method returns, the complete file is on disk."""
+        """Write an answer; on return, the complete file is on disk."""
         key = self.manifest.key(robot, index)
         self.write_entry(key, _FAILED if isinstance(answer, Failure) else _DONE, encode_answer(key, answer))
 
@@ -205,9 +207,9 @@ class Store:
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files whose names contain no key of the manifest, and move the files to `damaged/`.
+        """Report files with unknown names, and move them to `damaged/`.
 
-        For example, somebody may have renamed a file.
+        A name is unknown if it contains no key of the manifest.
         """
         keys = (
             self.manifest.key(robot, index)
@@ -220,7 +222,11 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Return (number of stored chunks, whether a chunk failed) for each robot, from file names only."""
+        """Count the stored chunks of each robot from file names.
+
+        Returns:
+            (number of chunks, whether a chunk failed) for each robot.
+        """
         names = {path.name for kind in (_DONE, _FAILED) for path in self._files(kind)}
         counts = {}
         for robot in range(len(self.manifest.robots)):
@@ -300,11 +306,10 @@ class Store:
 def open_store(
     folder: Path, manifest: Manifest, notify: Notify, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open or create the store of a validation, and lock the store for writing.
+    """Open or create the store of a validation, and lock it.
 
-    Without `shard`, only this process can write to the store. With the shard "2/4", other processes can write
-    the shards "1/4", "3/4" and "4/4" at the same time. With `retry_failed`, stored failures are deleted,
-    because the files of the failed robots may have changed.
+    With the shard "2/4", other processes can write the other shards at the same time. Without a shard, only
+    this process can write. `retry_failed` deletes stored failures, because the robots' files may differ now.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -341,9 +346,9 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether a file or folder may belong to a store, although the store has no manifest yet.
+    """Return whether a file or folder may belong to a new store.
 
-    Several processes may create one store. A process creates locks and folders before the manifest.
+    Another process may have created its locks and folders, but not the manifest.
     """
     return path.name in (_SCRATCH, _CHUNKS) or path.name.startswith(_LOCK)
 
@@ -351,9 +356,9 @@ def _is_ours(path: Path) -> bool:
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Return the store with its manifest.
 
-    There are three cases. If the folder has no manifest, the manifest is written. If robots' files have
-    changed and all these robots have failed, `retry_failed` replaces the manifest. Otherwise, the two
-    manifests must agree; the old manifest remains, because it contains the original start time.
+    - No manifest in the folder: write the manifest.
+    - Changed files, and all these robots failed: `retry_failed` replaces the manifest.
+    - Otherwise: both manifests must agree. The old manifest stays, with the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -394,7 +399,7 @@ def _hold_lock(folder: Path, shard: str | None) -> Iterator[None]:
 
 
 def _lock_file(path: Path, flags: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
-    """Open the file of a lock; raise SourceError if the path is a link, a pipe or a device."""
+    """Open the file of a lock; refuse links, pipes and devices."""
     message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -412,7 +417,7 @@ def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # To test whether the lock is free, another process may hold the lock for a moment.
+        time.sleep(0.1)  # Another process may hold the lock briefly to test it.
     raise InputError(
         "another process uses this store",
         where=str(folder),
@@ -480,9 +485,9 @@ class AccuracyStore:
 
     @classmethod
     def from_store(cls, store: Store) -> AccuracyStore | None:
-        """Return the accuracy results in a store; None if there are no accuracy results.
+        """Return the stored accuracy results, or None.
 
-        If the settings of the accuracy study cannot be read, notify the user and return None.
+        Unreadable settings also give None, and a message to the user.
         """
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
@@ -510,7 +515,6 @@ class AccuracyStore:
         self._store.write_entry(key, _STUDY_SUFFIX, pack(key, {"accuracy": study}))
 
     def robot_sha256(self, robot: int) -> str:
-        """Return the sha256 of the robot's text."""
         return self._store.manifest.robots[robot][1]
 
     def _check_same(self, other: AccuracyStore) -> None:

@@ -58,17 +58,17 @@ from urdfkin.verify.quantities import (
 )
 
 #: Version of the file format of the test vectors.
-#: Programs that read version 1 can read all versions 1.x, but not version 2.
+#: Programs that read version 1 can read all versions 1.x.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
-#: If a joint's limits exclude zero, the joint is at the limit nearest to zero.
+#: If the limits exclude zero, the joint is at the nearest limit.
 SAMPLES = 3
-#: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
-#: Random positions of planar and floating joints are in the same interval.
+#: Range of random velocities and accelerations.
+#: Planar and floating joints have positions in the same range.
 _RANGE = 2.0
-#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
-#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
+#: Inputs are rounded to multiples of 1 / _GRID.
+#: Exceptions are quaternions and limits. Multiples of 1 / 1024 are exact as decimals and doubles.
 _GRID = 1024.0
 #: A tolerance is first rounded to 12 significant digits.
 #: Then the tolerance is rounded upward to 3 significant digits.
@@ -80,16 +80,16 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The vectors use the error bound of the classical acceleration for the spatial acceleration too.
-#: The two accelerations differ by the cross product of angular and linear velocity.
-#: The error bound of the classical acceleration includes the error of this product.
+#: Spatial accelerations have the bound of classical accelerations.
+#: They differ by the cross product of angular and linear velocity.
+#: The bound includes the error of this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
 
 
 class JointEntry(TypedDict):
-    """A joint that has its own elements in q, v and a, and the indices of these elements."""
+    """A joint, and the indices of its elements in q, v and a."""
 
     name: Annotated[str, doc("Name of the joint.")]
     type: Annotated[str, doc("Type of the joint in the URDF.")]
@@ -169,7 +169,11 @@ VECTORS = DocumentKind("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A small robot with one feature of URDF; `note` states a known difference between libraries."""
+    """A small robot with one feature of URDF.
+
+    Attributes:
+        note: Known difference between libraries.
+    """
 
     name: str
     rule: str
@@ -231,7 +235,7 @@ def _robot(row: Mapping[str, Any]) -> str:
 
 
 def _fraction(*words: object) -> float:
-    """Return a number in [0, 1) that is computed from the SHA-256 digest of `words`."""
+    """Return a number in [0, 1) from the SHA-256 digest of `words`."""
     digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
@@ -243,7 +247,7 @@ def _on_grid(x: float) -> float:
 def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q, v and a of a sample.
 
-    The numbers depend only on the index of the sample and on the robot's name, joints and limits.
+    The numbers depend only on the sample's index, and on the robot's name, joints and limits.
     """
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -269,7 +273,7 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
 
 
 def _tolerance(k: float, scale: float) -> str:
-    """Return k * eps * scale as a decimal, rounded up; 0 if the scale is 0."""
+    """Return k * eps * scale as a decimal, rounded up."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_DIGITS):
@@ -283,9 +287,10 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class VectorFiles:
-    """The files that were written for one robot.
+    """The files of one robot.
 
-    `numbers` is the number of expected values in the robot's test vectors.
+    Attributes:
+        numbers: Number of expected values in the test vectors.
     """
 
     robot: str
@@ -318,7 +323,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[VectorFiles
 
 
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> VectorFiles:
-    """Write the test vectors of a robot for the robot's default tip.
+    """Write the test vectors of the robot's default tip.
 
     If the robot is not in the catalogue, also write its URDF.
     """
@@ -394,7 +399,7 @@ def _write(place: Path, robot: Robot, head: _Header, frames: Sequence[str], samp
 
 
 def _result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON, without converting the decimals to doubles."""
+    """Return a result as JSON, with its exact decimals."""
     texts = {name: json_text(x) for name, x in one.items()}
     texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
@@ -418,8 +423,7 @@ def _results(
 ) -> Iterator[dict[str, Any]]:
     """Yield the results of a sample.
 
-    A result is computed as an interval with `digits` digits. If the interval is too wide to round the result
-    to 17 significant digits, the value is None.
+    Results are intervals with `digits` digits. If an interval is too wide for 17 digits, the value is None.
     """
     tree, (q, v, a) = robot.tree, inputs
     for frame in frames:

@@ -38,7 +38,7 @@ from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, W
 
 #: Module with the function `serve`, which each worker process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time (seconds) between the end of a worker's pipe and the end of its process.
+#: Maximum time for the end of a worker, s.
 _GRACE = 5.0
 
 
@@ -72,10 +72,10 @@ class WorkerProcess:
 
 
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
-    """Start a Python interpreter that imports the same packages as this process.
+    """Start a Python interpreter with the same packages.
 
-    The interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
-    process, which then saves the finished results.
+    The interpreter has its own process group. Therefore, Ctrl-C interrupts only the parent, which saves the
+    finished results.
     """
     command = python_command(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
@@ -100,7 +100,12 @@ _PR_SET_PDEATHSIG = 1
 
 
 def serve(pipe: int, parent: int) -> None:
-    """Run chunks that the parent process sends; `pipe` is the file descriptor of the connection."""
+    """Run the chunks that the parent process sends.
+
+    Args:
+        pipe: File descriptor of the connection.
+        parent: Process id of the parent.
+    """
     _end_with(parent)
     connection, chunks = Connection(pipe), SimpleQueue[Chunk]()
     threading.Thread(target=_receive_chunks, args=(connection, chunks), daemon=True).start()
@@ -109,7 +114,7 @@ def serve(pipe: int, parent: int) -> None:
 
 
 def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
-    """Receive the next chunks while an earlier chunk is computed; end this process when the parent ends."""
+    """Receive chunks, and end this process when the parent ends."""
     try:
         while True:
             chunks.put(connection.recv())
@@ -120,7 +125,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 def _end_with(parent: int) -> None:
     """End this process when its parent process ends.
 
-    On Linux, the operating system ends the process, even if compiled code hangs.
+    On Linux, this also works while compiled code hangs.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -129,7 +134,12 @@ def _end_with(parent: int) -> None:
 
 
 class ProcessEngine:
-    """Engine with at most `jobs` local processes at a time; if `isolate`, each robot has its own process."""
+    """Engine with local worker processes.
+
+    Attributes:
+        jobs: Maximum number of processes at a time.
+        isolate: Whether each robot has its own process.
+    """
 
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate
@@ -137,8 +147,7 @@ class ProcessEngine:
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks of all robots.
 
-        If a process crashes during the tasks of a robot, the remaining tasks of this robot run last. Each
-        such robot then has a process of its own.
+        After a crash, the robot's remaining tasks run last, in a process of their own.
         """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
@@ -152,20 +161,21 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    Without `alone`, a process validates one robot after another. With a text `alone`, each process validates
-    only one robot. If such a process crashes, the report states the text as the reason.
+    Attributes:
+        alone: Text in the report if a process with only one robot crashes; None: processes validate several
+            robots.
     """
 
     def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Tasks of each robot that crashed a process: the task that crashed, and the remaining tasks.
-        #: These tasks run after the tasks of all other robots.
+        #: Tasks of each robot that crashed a process.
+        #: These tasks run after all others.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
-        """Run until no task is left. The worker processes always end, even after an exception."""
+        """Run until no task is left; the worker processes always end."""
         try:
             while True:
                 self._assign_tasks()

@@ -44,20 +44,20 @@ from urdfkin.verify.oracle import (
 )
 from urdfkin.verify.pinocchio import tree_depth
 
-#: Placeholder for the mass (kg) and the moments of inertia (kg m^2) of each link.
+#: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
 #: Maximum number of links in a chain.
-#: MuJoCo's loading time grows with the square of the number of links.
-#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
+#: Loading time grows with the square of the number of links.
+#: MuJoCo rejects chains of more than 1,023 links after loading.
 _MAX_DEPTH = 1_000
-#: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
+#: MuJoCo's joints for a planar or floating joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
     "planar": ("slide x", "slide y", "hinge"),
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Maps a joint's kind to the numbers of coordinates and of joint velocities in urdfkin.
-#: All other kinds have one coordinate and one joint velocity.
+#: Numbers of coordinates and joint velocities of a joint's kind.
+#: Other kinds have one coordinate and one joint velocity.
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -72,12 +72,12 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """The indices of one moving joint in MuJoCo's and in urdfkin's vectors, and the joint's mimic rule.
+    """First indices of a moving joint.
 
-    Each index is the index of the joint's first element. `qpos` and `qvel` are indices in MuJoCo's vectors.
-    `q` and `v` are indices in urdfkin's vectors. An index is -1 if urdfkin's vector has no value for the
-    joint. For a moving base, `q` and `v` are -1. For a locked joint, `v` is -1, `multiplier` is 0, and
-    `offset` is the locked value.
+    Attributes:
+        q: -1 for a moving base.
+        v: -1 for a moving base or locked joint.
+        offset: Value of a locked joint.
     """
 
     kind: str
@@ -160,7 +160,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
+        # MuJoCo requires these limits, but its kinematics ignores them.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
@@ -206,7 +206,7 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._compute_motion(x, 3)
         if not Reference.of(x.reference).at_world:
             return _change_reference(x.reference, poses, acceleration)
-        # A spatial acceleration can be shifted to the world origin; a classical acceleration cannot.
+        # Only a spatial acceleration can be shifted to the world origin.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, velocity = (
@@ -241,11 +241,11 @@ class MujocoOracle(Oracle):
         poses = self._compute_poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
+        if which.own_axes:  # In rotating axes, J-dot has the term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _change_reference(which, poses, rate, columns=True)
-        if which.at_world:  # The time derivative of p x J_angular contains vel x J_angular.
+        if which.at_world:  # The derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
@@ -262,10 +262,10 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return placements (n, frames, 4, 4).
+        """Return the placements of all frames.
 
-        The method calls `read(body, (k, f))` for each sample k and frame f. MuJoCo receives the first `count`
-        of the inputs q, v and a. `read` can read further results from `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a.
+        The function `read` reads further results from `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
@@ -288,7 +288,6 @@ class MujocoOracle(Oracle):
         return out
 
     def _read_jacobian(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return the Jacobian (6, MuJoCo's nv) of the body's origin, [linear; angular]."""
         J = np.zeros((6, self._model.nv))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
         function(self._model, self.data, linear, angular, self.data.xpos[body], body)
@@ -296,7 +295,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
+        """Read the velocity or acceleration of a body."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
@@ -333,7 +332,7 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
+            # Slide joints move in world axes, the ball joint in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -344,11 +343,7 @@ class MujocoOracle(Oracle):
         return qpos, rates, second
 
     def _velocity_matrix(self, q: FloatArray) -> FloatArray:
-        """Return the matrices S that convert urdfkin's v to MuJoCo's qvel: qvel = S v.
-
-        The shape is (n, MuJoCo's nv, nv). If S is the same in all configurations, the first axis has the
-        length 1.
-        """
+        """Return S with qvel = S v."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, v = joint.qvel, joint.v
@@ -364,7 +359,10 @@ class MujocoOracle(Oracle):
         return S
 
     def _velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative S' of S, computed from R' = R [w]x of floating and planar joints."""
+        """Return the time derivative of S.
+
+        For floating and planar joints, R' = R [w]x.
+        """
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
@@ -378,9 +376,10 @@ class MujocoOracle(Oracle):
 
 
 def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a floating or planar joint's rotation, and the number of slide joints that replace the joint.
+    """Return a joint's rotations.
 
-    The rotation has the shape (n, 3, 3) for a floating joint, and (n, 2, 2) for a planar joint.
+    Returns:
+        Rotations (n, k, k), and the number k of slide joints.
     """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
@@ -395,10 +394,9 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
+    """Move all mass to the root.
 
-    MuJoCo computes velocities at the centre of mass. With the centre of mass at the root's origin, MuJoCo
-    computes lever arms of length zero exactly.
+    With the mass at the root, MuJoCo computes zero lever arms exactly.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -412,7 +410,10 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
+    """Return the joints depth first, and the links.
+
+    Siblings are sorted by name.
+    """
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()
@@ -449,7 +450,6 @@ def _scalar_first(quaternion: FloatArray) -> FloatArray:
 
 
 def _rotation(quaternion: FloatArray) -> FloatArray:
-    """Return rotations (..., 3, 3) of unit quaternions (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -462,7 +462,7 @@ def _rotation(quaternion: FloatArray) -> FloatArray:
 def _change_reference(
     reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
 ) -> FloatArray:
-    """Convert six-vectors, or Jacobian columns, from LOCAL_WORLD_ALIGNED to another reference frame."""
+    """Convert values from LOCAL_WORLD_ALIGNED to another reference frame."""
     six = values if columns else values[..., None]
     linear, angular = six[..., :3, :], six[..., 3:, :]
     match Reference.of(reference):

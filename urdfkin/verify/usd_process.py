@@ -57,7 +57,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_joints_twice(read: Usd) -> dict[str, Any]:
-    """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
+    """Read each joint with both readers."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -67,14 +67,14 @@ def _read_joints_twice(read: Usd) -> dict[str, Any]:
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
             # A joint with PhysicsArticulationRootAPI has two descriptions in OpenUSD.
-            # One describes the joint, and the other describes an articulation and is skipped.
+            # One describes the joint, the other an articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
 
 
 def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
-    """Return `UsdJoint.as_list` for a joint that OpenUSD's parser has read."""
+    """Return `UsdJoint.as_list` for OpenUSD's joint."""
     frames = []
     for i in (0, 1):
         p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
@@ -84,7 +84,7 @@ def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # `ends` is None if the joint has several free directions.
+        ends = own.get(free.lower())  # `ends` is None for a joint with several free directions.
     factor = np.pi / 180.0 if free.startswith("rot") else read.meters_per_unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
@@ -93,7 +93,7 @@ def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
 
 
 def _degrees_of_freedom(physics: Any, one: Any) -> str:
-    """Return the names of a joint's degrees of freedom, such as `transX` or `rotX`."""
+    """Return names such as "transX rotX"."""
     for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
         if isinstance(one, kind):
             return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"

@@ -23,7 +23,7 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: Direction of view (rad): elevation above the base's x-y plane, and azimuth about the base's z axis.
+#: Direction of view: elevation and azimuth in the base frame, rad.
 _ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
@@ -109,10 +109,10 @@ class _Canvas:
                 position = position + step * side
             occupied.append(position)
             look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            # Without this background, a line through a label makes the label illegible.
+            # Lines would make the label illegible.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
-            # The label of an x axis or a z axis is a formula, for example $x_1$.
-            # All other labels are plain text, because a name in a file may contain "$".
+            # Labels of x and z axes are formulas, such as $x_1$.
+            # Other labels are plain text, because names may contain "$".
             self.axes.text(*position, ", ".join(texts), parse_math=color in (_X, _Z), **look)
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Map each placeholder colour in a drawing to the CSS variable that replaces it in a page.
+#: CSS variables that replace placeholder colours.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -37,7 +37,7 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, which are distinguishable with every colour vision deficiency.
+#: Okabe and Ito's colours for all colour vision deficiencies.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
@@ -48,7 +48,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
-    # A name is plain text, even if the user's settings allow mathematics and TeX.
+    # Names are plain text, never TeX.
     "text.parse_math": False,
     "text.usetex": False,
     "axes.spines.top": False,

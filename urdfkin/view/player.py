@@ -22,7 +22,7 @@ from urdfkin.view.plot import caption
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _UPDATE_RATE = 20.0
-#: Frames per second, maximum number of frames, and size in pixels of a saved motion.
+#: Frame rate, maximum number of frames, and size in pixels.
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
@@ -156,7 +156,7 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
     """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds`."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
-    # A GIF stores durations in 1/100 s, and browsers show frames of 1/100 s for too long.
+    # Browsers show GIF frames of 1/100 s for too long.
     milliseconds = max(20, 10 * round(100 * seconds))
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
     return stream.getvalue()

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A panel is a function that draws one diagram, for example the velocity of the frame.
-#: The arguments are matplotlib's Axes, the motion of the frame, and the time (s) of each sample.
+#: A panel draws one diagram, for example the frame's velocity.
+#: Arguments: matplotlib's Axes, the motion, the times (s).
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
 #: The dashes of seven lines. The first six lines are distinguishable without colours.
@@ -80,7 +80,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # If the range of the axis contains fewer than two powers of ten, the axis gets three other ticks.
+    # Axes with fewer than two powers of ten get three other ticks.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -110,8 +110,8 @@ def draw_disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The plot's vertical axis is logarithmic.
-    # The reason is that bounds are about a hundred times the usual disagreement.
-    # Below 1 eps * scale, the size of one rounding error, the plot's vertical axis is linear.
+    # Bounds are about a hundred times the usual disagreement.
+    # Below 1 eps * scale, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -132,10 +132,10 @@ PANELS: dict[str, Panel] = {
     "disagreement": draw_disagreement,
 }
 
-#: Suffix that follows "rad" or "m" in the unit of q, v or a.
+#: Suffix after "rad" or "m" in the unit of q, v or a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: The names "q", "v" and "a" select panels that draw the coordinates of the robot.
-#: Each name selects up to three panels: one for angles, one for lengths, and one for quaternions.
+#: "q", "v" and "a" select panels of the robot's coordinates.
+#: Angles, lengths and quaternions have separate panels.
 COORDINATES = tuple(_PER)
 
 
@@ -211,13 +211,13 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 
 
 #: Width and maximum height of a figure, in inches.
-#: A figure of this size fits on a page of A4 or US Letter with a margin.
+#: This size fits on A4 and US Letter with a margin.
 _PAGE = (7.6, 10.4)
-#: Height of a panel, and height of the title and the footer together, in inches.
+#: Heights of a panel, and of title and footer, inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Number of letters that fit into one inch of the footer, and into one inch of a legend.
+#: Letters per inch in the footer and in a legend.
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
-#: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
+#: Width of line sample and gaps in a legend entry, in letters.
 _HANDLE = 8
 _VELOCITIES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"

@@ -67,8 +67,8 @@ def open_page(address: str) -> Iterator[None]:
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
 #: Headers of every response.
-#: The headers forbid caching, guessing the content type, and embedding the page in other pages.
-#: The page's address contains the key, so the headers also forbid browsers to send the address as Referer.
+#: No caching, no guessed content types, no embedding.
+#: The address contains the key, so browsers send no Referer.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -170,7 +170,7 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message that the server accepts from a page: a control has changed.
+#: The only accepted message from a page: a changed control.
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.
@@ -283,7 +283,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's style and script come first, so they run before viser's.
+    # urdfkin's style and script run before viser's.
     own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:

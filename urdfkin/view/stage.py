@@ -25,7 +25,7 @@ from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, make_mesh, shapes
 
-#: Colours of the parts of the acceleration: red, green and blue from 0 to 255.
+#: Colours of the acceleration's parts, RGB from 0 to 255.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -120,7 +120,7 @@ def quaternions_scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum time (s) from the opening of a page to its final layout.
+#: Maximum time until a page has its final layout, s.
 _OPENING = 15.0
 _TO_CAMERA = np.array([1.1, -1.3, 0.6])
 #: Fraction of the view that the robot fills.

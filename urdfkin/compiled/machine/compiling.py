@@ -55,7 +55,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # The file's checksum is correct, but another version of Numba may have written the file.
+            # Another version of Numba may have written this valid file.
             # Reading such a file can cause any error.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
@@ -63,8 +63,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Code with dynamic globals contains memory addresses that are valid only in this process.
-        # Such code cannot be cached.
+        # Code with memory addresses of this process cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -104,7 +103,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba needs a Python function as the key of the compiled code. The Python function is never called.
+        # Numba needs a Python function as a key, but never calls it.
         descriptor, environment = state.cr.fndesc, state.cr.env
         handle = make_function(
             descriptor.lookup_module(), descriptor.qualname, "", 0, environment, (state.library,)
@@ -147,8 +146,8 @@ _config: Any = numba.config  # Numba defines these settings at run time.
 #: Without fast math, the compiler neither reorders nor fuses operations.
 #: The module `numbers` decides which operations are fused.
 #: Results therefore do not depend on the compiler.
-#: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
-#: The functions allocate no memory, so their arrays need no reference counts.
+#: Division by zero gives inf, as in C, without a branch.
+#: Functions without allocation need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINED: dict[str, Any] = {
     "forceinline": True,
@@ -194,7 +193,7 @@ def jit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 inline = jit(**_INLINED)
 
-# A read-only argument type also accepts a writable array, without a copy.
+# A read-only argument type also accepts writable arrays.
 FLOATS_1D = types.Array(types.float64, 1, "C", readonly=True)
 FLOATS_2D = types.Array(types.float64, 2, "C", readonly=True)
 INTS_1D = types.Array(types.int64, 1, "C", readonly=True)
@@ -215,7 +214,7 @@ class Kernel:
 
     def __getattr__(self, name: str) -> Any:
         # This method replaces a `cached_property`.
-        # Before Python 3.12, the lock of a `cached_property` could stay locked after a fork.
+        # Before Python 3.12, a fork could leave this lock locked.
         if name != "compiled_function":
             raise AttributeError(name)
         with compile_lock:

@@ -105,12 +105,12 @@ def _make_pointer_function(kind: Any) -> Any:
     return pointer_at
 
 
-#: Functions that convert an address to a pointer to doubles, and to a pointer to integers.
+#: Convert an address to a pointer to doubles or integers.
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
 #: Maximum number of doubles that are prefetched.
-#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
+#: 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_PREFETCHED = 3072
 
 
@@ -277,7 +277,7 @@ def prefetch(x, at, count):
             _prefetch(x, number)
 
 
-#: Prefetch distance in doubles: while `x[at]` is read, `x[at + _PREFETCH_DISTANCE]` is loaded into the cache.
+#: Prefetch distance in doubles.
 _PREFETCH_DISTANCE = 512
 
 
@@ -301,10 +301,9 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add to `total` the squares of `count` numbers that begin at `x[at]`.
 
-    If `count` is not a multiple of eight, each remaining number is added to all eight partial sums. Adding a
-    number eight times is harmless, because the total is compared only with a very large bound.
+    The last numbers may be added eight times. The total is compared only with a very large bound.
     """
-    # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
+    # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
     end = at + count
     while at + 4 * LANES <= end:

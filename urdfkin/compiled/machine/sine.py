@@ -67,22 +67,22 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         shifted = build_fma(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
-        # Let d be the double nearest to pi/2. If n is not 0, x and n d are multiples of 2^-53.
-        # The difference x - n d is then exact, because x and n d differ by less than 1.
+        # d: the double nearest to pi/2. For n != 0, x and n d are multiples of 2^-53.
+        # |x - n d| < 1, so the difference is exact.
         # If n is 0, the difference is x.
-        # The variable `r_error` is the rounding error of r, and `z_error` is the rounding error of z = r^2.
+        # `r_error`: rounding error of r. `z_error`: rounding error of z = r^2.
         near = build_fma(builder, n, all_lanes(-PI_2), x)
         r = build_fma(builder, n, all_lanes(-PI_2_REST), near)
         r_error = build_fma(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_error = build_fma(builder, r, r, builder.fneg(z))
-        # The variable `leading` is 1 - z/2, the beginning of the cosine's series.
+        # `leading`: 1 - z/2, the beginning of the cosine's series.
         # The variable `leading_error` is the rounding error of `leading`.
         leading = build_fma(builder, z, all_lanes(-0.5), all_lanes(1.0))
         leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
-        # To first order, sin(r + r_error) = sin r + r_error cos r.
-        # Similarly, cos(r + r_error) = cos r - r_error sin r.
-        # The largest term is added last, because the other terms and their rounding errors are small.
+        # sin(r + r_error) = sin r + r_error cos r to first order.
+        # cos(r + r_error) = cos r - r_error sin r to first order.
+        # The largest term is last, so rounding errors stay small.
         sine = build_fma(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(r_error, leading))
         sine = builder.fadd(r, sine)
         rest = build_fma(builder, builder.fmul(z, z), polynomial(z, COSINE), leading_error)
@@ -95,8 +95,8 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
         # An odd number of quarter turns exchanges sine and cosine.
-        # The sine changes its sign if the number of quarter turns modulo 4 is 2 or 3.
-        # The cosine changes its sign if the number of quarter turns modulo 4 is 1 or 2.
+        # The sine changes its sign after 2 or 3 quarter turns (modulo 4).
+        # The cosine changes its sign after 1 or 2 quarter turns (modulo 4).
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             apply_sign(builder.select(odd, cosine, sine), quarters),

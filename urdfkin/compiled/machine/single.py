@@ -44,15 +44,15 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
     int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
 
-#: Number of 8-byte words in the header of a Python object.
+#: Number of 8-byte words in a Python object's header.
 _HEADER_WORDS = object.__basicsize__ // 8
 #: A Python object consists of 8-byte words.
-#: The word with the index `_TYPE` is the memory address of the object's type.
-#: In a tuple, the word with the index `_ITEMS` is the memory address of the first item.
+#: Word `_TYPE`: address of the object's type.
+#: Word `_ITEMS` of a tuple: address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
-#: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
-#: The lower four bytes of the word `_NDIM` contain the number of axes.
-#: The lower four bytes of the word `_FLAGS` contain the flags.
+#: 8-byte words of a NumPy array (C structure PyArrayObject_fields).
+#: Lower four bytes of `_NDIM`: number of axes.
+#: Lower four bytes of `_FLAGS`: flags.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS,
     _HEADER_WORDS + 1,
@@ -60,9 +60,9 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS + 5,
     _HEADER_WORDS + 6,
 )
-#: The C structure PyArray_Descr describes the type of an array's elements.
-#: Its word with the index `_KIND_AND_ORDER` contains the byte order and the type number.
-#: `_NATIVE` is the native byte order, and `_DOUBLE` is the type number of doubles.
+#: PyArray_Descr: type of an array's elements.
+#: Word `_KIND_AND_ORDER`: byte order and type number.
+#: `_NATIVE`: native byte order. `_DOUBLE`: type number of doubles.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.
@@ -216,9 +216,9 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: Each quantity has a kernel for WORLD and LOCAL_WORLD_ALIGNED, and a kernel for LOCAL.
-#: The first number is the number of inputs: 1 for q, 2 for q and v, or 3 for q, v and a.
-#: The second number counts the axes of length nv of a result: 1 for a Jacobian (6, nv), 2 for a Hessian.
+#: Kernel for WORLD and LOCAL_WORLD_ALIGNED, and kernel for LOCAL.
+#: Number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
+#: Number of axes of length nv: 1 for a Jacobian, 2 for a Hessian.
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),

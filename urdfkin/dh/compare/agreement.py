@@ -37,26 +37,24 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
-#: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
+#: Default tolerance, m: covers one or two cells rounded to 0.1 mm.
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: A comparison reports the differing cells only if a correction of these cells reduces the tip error.
-#: The remaining tip error must be at most this fraction of the tip error without the correction.
-#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
+#: A correction of cells is reported if it reduces the tip error
+#: to at most this fraction, or below `NEGLIGIBLE_ERROR` times the reach.
 _CORRECTED_FRACTION = 0.5
-#: If a table does not agree with the URDF, the search for a mistake in the table uses this number.
-#: The search accepts a correction that reduces the tip error to at most this fraction.
-#: The search also accepts a correction with a remaining tip error within the tolerance.
+#: A mistake in a table explains a tip error if its correction
+#: reduces the error to at most this fraction, or within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Suppose that n cells differ without a fit, and m cells differ after a fit.
-#: The n cells are reported only if n - m is at most this number.
+#: Suppose n cells differ without a fit, m cells after a fit.
+#: The n cells are reported if n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: The reach is computed from the positions of the tip.
-#: If the tip moves by less than this fraction of the path length, `_reach` returns the path length instead.
+#: If the tip moves less than this fraction, the path length replaces the reach.
 _FIXED_TIP_SPREAD = 1e-6
-#: Half a unit of the last digit (metres or radians) of each cell, for each row.
+#: Half a unit of each cell's last digit, in metres or radians.
 HalfDigits = Sequence[Mapping[str, float]]
 
 

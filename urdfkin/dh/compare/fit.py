@@ -40,33 +40,32 @@ _MOTIONS = {
 }
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
-#: Maximum change of a parameter in one step of the fit (rad, or a fraction of the reach).
+#: Maximum change of a parameter per step (rad, or fraction of the reach).
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: Mean error, relative to the reach, at which the fit of the cells ends.
+#: Mean error at which the fit ends, relative to the reach.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
 _MIN_WEIGHT = 1e-9
-#: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
-#: Two cells with the same effect have different weights, so that only one of these cells changes.
+#: Initial weight of the last cell; the first cell has 1.
+#: Of two cells with the same effect, only one then changes.
 _LAST_WEIGHT = 1.2
-#: The first number is the initial weight of every cell in the column beta.
-#: At each reweighting, the weights of the column beta are multiplied by the second number.
-#: Both numbers are below 1, so that beta changes only if a change of alpha is not enough.
+#: Initial weight of cells in the column beta, and factor per reweighting.
+#: Both are below 1: beta changes only if alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: The fit tries large changes of joint offsets only if the mean error exceeds this fraction of the reach.
+#: Above this mean error (relative to the reach), the fit tries large offset changes.
 _ROUNDING = 1e-13
-#: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
+#: Below this tip error (relative to the reach), no joint sign changes.
 _TIP_ROUNDING = 1e-12
-#: Other joint signs are accepted only if they reduce the smallest tip error so far below this fraction.
+#: Other joint signs must reduce the tip error below this fraction.
 _OTHER_START_ERROR = 0.5
-#: Angles (rad) by which the offsets of two consecutive joints change in opposite directions.
+#: Opposite changes of the offsets of two consecutive joints, rad.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
+#: `count` and `beam_width` of a fast fit.
 FAST_SEARCH = (3, 16)
 
 
@@ -194,9 +193,9 @@ def apply_changes(
     for i, offset in enumerate(free[12:]):
         k = model.variable_indices[i]
         new_cells[i, k] += offset * units[k]
-    # The twist that changes the base is expressed in the frame of the first revolute joint.
-    # The twist that changes the tool is expressed in the frame of the last revolute joint.
-    # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
+    # The base's twist is in the frame of the first revolute joint.
+    # The tool's twist is in the frame of the last revolute joint.
+    # Rotations about their z axes act like joint offsets.
     base = _apply_twist(model.base @ model.T_0_first, free[:6], scale) @ np.linalg.inv(model.T_0_first)
     tool = np.linalg.inv(model.T_last_tip) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.T_last_tip
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -228,7 +227,7 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         by_cells = by_cells * mask.ravel()
         by_free = by_free if free else np.zeros_like(by_free)
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
-        # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
+        # rcond prevents large opposite offsets of nearly coinciding axes.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -304,8 +303,8 @@ def fit_model(
     if best_size <= EPS * fit_roundings(0) * targets.scale:
         return written
     for i, start in enumerate(start_models(chain, standard, *(FAST_SEARCH if fast else ()))):
-        # A fit minimizes the sum of the squared errors of all samples, but `size` is the largest error.
-        # Therefore, `size` may be smaller before the fit than after the fit.
+        # A fit minimizes squared errors, but `size` is the largest error.
+        # Therefore, a fit can increase `size`.
         model = min(fit_free_parameters(start, targets, large_angles=not fast), start, key=size)
         model_size = size(model)
         if model_size < (1.0 if i == 0 else _OTHER_START_ERROR) * best_size:

@@ -32,17 +32,17 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each difference from the interpretation that the file states has the same cost.
-#: For each interpretation, the difference between the table's shape and the URDF's shape is computed.
-#: The cost is this fraction of the smallest of these differences, plus the tolerance at the tip (metres).
+#: Each difference from the stated interpretation has the same cost.
+#: Each interpretation gives a difference between the shapes of table and URDF.
+#: Cost: this fraction of the smallest difference, plus the tolerance (m).
 _DIFFERENCE_COST = 0.1
-#: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
-#: A larger tip error must be at most this fraction of the reach.
-#: A larger tip error must also be at most this fraction of the tip error with the stated interpretation.
+#: Tip errors within the tolerance are always accepted.
+#: Larger tip errors must be at most this fraction of the reach,
+#: and of the tip error with the stated interpretation.
 _BETTER_FRACTION = 0.05
-#: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
+#: All other keys of a row are ignored, such as limits.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: `find_better_interpretation` ignores these keys of a table, because the function fits base and tool.
+#: Base and tool are fitted, so these keys are ignored.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
@@ -92,8 +92,8 @@ def find_better_interpretation(
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
-        # A joint is prismatic if its variable, for example q1, is in the column d.
-        # Therefore, an exchange of columns can change the kind of a joint.
+        # A joint is prismatic if its variable is in the column d.
+        # An exchange of columns can change a joint's kind.
         if [row.kind.turns for row in table.rows] != kinds or not kinds:
             continue
         difference = float(np.abs(path_shape(table, chain.reach) - shape_of_urdf).sum())

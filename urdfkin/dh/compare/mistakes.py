@@ -32,7 +32,7 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _ANGLE_TOLERANCE = 1e-9
-#: Joint offsets and joint signs are not fitted if a table has more possible corrections than this number.
+#: With more possible corrections, offsets and signs are not fitted.
 _MAX_FITS = 100
 
 
@@ -189,7 +189,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # With two or three rows, a reversal only exchanges the first and the last row.
+    # With two or three rows, reversal exchanges first and last row.
     # The loop above already contains this exchange.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))

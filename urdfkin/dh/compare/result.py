@@ -20,16 +20,15 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: After a correction of cells, a tip error up to this number is treated as zero.
+#: Corrected tip errors up to this number count as zero.
 #: The unit is rad, or metres per metre of reach.
-#: The rounding errors of a fit are far below this number.
-#: The rounding errors of numbers in data sheets are far above this number.
+#: Rounding errors of a fit are much smaller.
+#: Rounding errors in data sheets are much larger.
 NEGLIGIBLE_ERROR = 1e-9
-#: Smallest tip error that `fit_resolution` uses (rad, or metres per metre of reach).
-#: A tip error below this number is replaced by this number.
+#: Smallest tip error in `fit_resolution` (rad, or metres per metre of reach).
 _MIN_TIP_ERROR = 1e-12
-#: Half a unit of a cell's last digit is multiplied by this factor.
-#: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
+#: Factor for half a unit of a cell's last digit.
+#: Doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_FACTOR = 1.0 + 1e-6
 
 

@@ -29,11 +29,11 @@ from urdfkin.model.tree import FloatArray
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
 #: Cost (metres) of each joint with sign -1.
-#: If several alignments fit equally well, the alignment with the URDF's joint signs is therefore preferred.
+#: Among equal alignments, the URDF's joint signs are preferred.
 _REVERSAL_COST = 1e-9
-#: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
+#: A prismatic axis can be shifted, so lengths beside it matter little.
 _PRISMATIC_WEIGHT = 1e-3
-#: Below this distance (metres), two axes count as coinciding, so that x can have any direction.
+#: Closer axes (m) coincide, so x can have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
@@ -103,9 +103,9 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # If axes nearly coincide, many directions of x are nearly equivalent.
-    # One start value is enough for all these directions, because the fit can rotate x.
-    # Therefore, only the best alignment is kept for each combination of joint signs.
+    # Nearly coinciding axes have many equivalent directions of x.
+    # One start value is enough, because the fit can rotate x.
+    # Only the best alignment of each sign combination is kept.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -116,7 +116,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
     """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # If a joint offset can be chosen freely, a change of this offset by pi reverses x.
+        # A change of a free joint offset by pi reverses x.
         # Both directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
@@ -207,12 +207,12 @@ def _possible_transforms(
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
         shifted = shift_along_z(A, -delta)
-        # The axis of a prismatic joint can be moved to any parallel line.
-        # If one of the two joints is prismatic, the direction of the x axis can therefore be chosen freely.
+        # A prismatic axis can be moved to any parallel line.
+        # Next to a prismatic joint, any direction of x is possible.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
-        # With reach 0, a common normal is distant if it misses one of the two origins.
+        # Above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
+        # With reach 0, a distant common normal misses an origin.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

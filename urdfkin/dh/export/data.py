@@ -87,7 +87,7 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    # TOML accepts JSON's numbers and escapes, except for surrogate pairs.
+    # TOML accepts JSON's numbers and escapes, but no surrogate pairs.
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return "".join(c if c.isprintable() else escape_sequence(c) for c in text)
 

@@ -30,8 +30,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: A bound is multiplied by this factor before the last printed digit is rounded up.
-#: Without the factor, a tiny rounding error of the bound could increase the last digit by 1.
+#: Factor on a bound before its last digit is rounded up.
+#: A tiny rounding error must not increase the last digit.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -273,9 +273,9 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
-    # `DHTable` rejects a base or a tool whose rotation is rounded to few digits.
+    # `DHTable` rejects rotations that are rounded to few digits.
     # Therefore, the table is evaluated without base and tool.
-    # The poses of the table are then multiplied by the rounded base and by the rounded tool.
+    # The table's poses are multiplied by the rounded base and tool.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)

@@ -20,8 +20,8 @@ from urdfkin.kinematics.latex import latex
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
 #: Numbers of the equations whose statements are unknown.
-#: Page 2 of the textbook's chapter, which contains the equations 7.6 to 7.10, is lost.
-#: Equation 7.7 is known nevertheless, because section 7.2 repeats equation 7.7.
+#: Page 2 of the chapter, with equations 7.6 to 7.10, is lost.
+#: Section 7.2 repeats equation 7.7.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -43,12 +43,11 @@ class Equation:
     """One numbered equation.
 
     Attributes:
-        statement: The equation in urdfkin's notation, in plain characters.
-        definitions: Names of the functions in `urdfkin.kinematics.equations` that contain the equation's
-            formula.
-        functions: Functions that compute the equation, as "module:name".
-        tests: Tests that fail if the equation is computed wrongly, as "file::name".
-        oracle: The independent source with which the tests compare the result.
+        statement: The equation in plain characters.
+        definitions: Functions of `urdfkin.kinematics.equations`.
+        functions: Names such as "module:name".
+        tests: Names such as "file::name".
+        oracle: Independent source of expected results.
     """
 
     number: str
@@ -63,7 +62,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One or more sections of the chapter; `number` is, for example, "7.3" or "7.2.4, 7.2.5"."""
+    """One or more sections of the chapter."""
 
     number: str
     title: str
@@ -72,7 +71,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter; `test` names the proving test, as "file::name"."""
+    """A wrong or incomplete statement in the chapter."""
 
     where: str
     printed: str
@@ -118,7 +117,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
 
 
 def equations_page() -> str:
-    """Return the text of the page docs/equations.md."""
+    """Return the text of docs/equations.md."""
     parts = [_head()]
     for section in sections():
         head = "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
@@ -179,7 +178,10 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page of text about "7.130", "(7.130)" or "eq. 7.130"; None for other text."""
+    """Return the text about an equation.
+
+    `number` is, for example, "7.130" or "(7.130)"; other text gives None.
+    """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST_EQUATION:
         return None

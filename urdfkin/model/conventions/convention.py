@@ -129,7 +129,7 @@ def _load_built_in() -> dict[str, Convention]:
     }
 
 
-#: Names of the built-in conventions, in the order of conventions.toml. A test compares the two orders.
+#: Built-in conventions, in the order of conventions.toml.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
@@ -266,10 +266,10 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: An encoded number is a sequence of characters of `_DIGITS`.
-#: The value of a character is its index in `_DIGITS`, from 0 to 61.
-#: The last character of a number has a value below `_THRESHOLD`.
-#: All other characters of the number have values of at least `_THRESHOLD`.
+#: Characters of an encoded number.
+#: A character's value is its index, from 0 to 61.
+#: The last character of a number has a value below `_THRESHOLD`;
+#: all others have larger values.
 _THRESHOLD = 31
 
 

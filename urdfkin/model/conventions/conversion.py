@@ -25,7 +25,7 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Largest allowed difference (rad or m) between a mimic joint's value and the value from its mimic rule.
+#: Largest allowed deviation from a mimic rule, rad or m.
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -162,7 +162,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The URDF text does not contain a root joint that urdfkin added. The rank -1 puts this joint first.
+        # The rank -1 puts an added root joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -191,10 +191,10 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             joints, links = list[int](), [link]
-            # The loop appends links to the list and visits these links later.
+            # The loop also visits the links that it appends.
             for parent in links:
                 for i in children.get(parent, []):
-                    # A locked joint is still a moving joint in the target program.
+                    # Locked joints still move in the target program.
                     if self.tree.joints[i].original.kind.nv or not merged:
                         joints.append(i)
                     else:

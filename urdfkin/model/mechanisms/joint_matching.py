@@ -239,7 +239,7 @@ class _JointGeometry:
 
 
 def _line_difference(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
+    if kind == "floating":  # a floating joint reaches every pose
         return 0.0, 0.0
     return line_difference(s, t, with_distance=kind == "turns")
 
@@ -322,8 +322,8 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If a branch has no joint after this axis, the axes of other branches determine the pose of B's root.
-        # For example, each rotor of a drone has a branch of its own with a single joint.
+        # Axes of other branches then determine the pose of B's root.
+        # For example, each rotor of a drone is a branch.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -361,7 +361,7 @@ def root_poses_by_siblings(
                 pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
-            # So the axes of the next joints must determine the shift along u.
+            # The next axes must determine the shift along u.
             if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
@@ -428,16 +428,15 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
     return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
 
 
-#: Function that proposes poses of the next body of B.
-#: In A and in B, one of two matched joints connects the current body to the next body.
-#: The first argument contains the next bodies of A and B, and the second argument contains the two joints.
-#: The third argument is the pose of B's current body.
+#: Function that proposes poses of the next body of B. Arguments:
+#: next bodies of A and B, the two joints before these bodies,
+#: and the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
-#: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
+#: Maximum number of joint pairs per pair of bodies.
 MOST_ASSIGNMENTS = 5000
 
-#: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
+#: Matching coordinate of B, and velocity ratio B / A.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 

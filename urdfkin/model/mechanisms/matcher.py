@@ -56,21 +56,20 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Maximum depth of a tree, in joints, for the recursive search for an exact match.
+#: Maximum depth, in joints, for the search for an exact match.
 MOST_DEPTH = 200
-#: Maximum number of later joints on a branch that the matcher compares if several choices are equally good.
+#: Maximum number of later joints that decide between equal choices.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root that the search for an exact match tries.
+#: Maximum number of poses of B's root in this search.
 MOST_ROOT_POSES = 48
-#: The score of an alignment is the number of links and axes that agree, and the largest difference (m).
-#: The alignment with the larger number is better.
-#: If the numbers are equal, an alignment with a much smaller difference is better.
-#: The smaller difference must be less than this factor times the larger difference.
+#: The score counts agreeing links and axes; equal scores compare
+#: the largest differences (m).
+#: A difference is better if it is below this fraction of the other.
 BETTER_RATIO = 0.5
 
-#: A zero offset (rad or m), or a pose for a planar or floating joint.
+#: A zero offset (rad or m), or a planar or floating joint's pose.
 _Choice = TypeVar("_Choice", float, FloatArray)
-#: Number of links and axes of A that agree with B, and the largest difference (m).
+#: Number of agreeing links and axes, and largest difference (m).
 Score = tuple[int, float]
 
 
@@ -229,7 +228,7 @@ class MechanismMatcher:
             yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
-        # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
+        # B's root can match a body behind A's floating root joint.
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
@@ -418,8 +417,8 @@ class MechanismMatcher:
             )
         body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
-        # Let P_a and P_b be the joint's poses in A and B, so P_b = M P_a N.
-        # If the path leads from the joint's child to its parent, P_a and P_b are the inverse poses.
+        # P_a, P_b: the joint's poses in A and B; P_b = M P_a N.
+        # From child to parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
@@ -480,7 +479,7 @@ class MechanismMatcher:
             offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
+        # K displaces the axis alone, or with all later bodies.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
         with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -529,7 +528,7 @@ class MechanismMatcher:
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
-            # If all axes and links agree, no other choice can agree better.
+            # All axes and links agree, so no choice is better.
             if not score[1] and self.joint_matcher.links(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -637,14 +636,14 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
     )
 
 
-#: Maximum number of joint orders that are tried; five prismatic joints have 120 possible orders.
+#: Maximum number of joint orders: those of five prismatic joints.
 MOST_ORDERS = 120
-#: Maximum number of later joint pairs that a search compares; see `LookAhead`.
-#: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
+#: Maximum number of compared later joint pairs, see `LookAhead`.
+#: Without names, TALOS needs 500 pairs, and Baxter 1,000.
 MOST_LOOK_AHEAD = 2000
-#: Larger angle tolerances (rad) that are tried in this order if A and B differ.
+#: Larger angle tolerances for models that differ, rad.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Maximum number of attempts to exchange the partners of two joint pairs.
+#: Maximum number of attempts to exchange two partners.
 MOST_EXCHANGED = 12
 
 
@@ -705,7 +704,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
     Robots with mirrored arms can need exchanges.
     """
-    # If a joint exists in one model only, no exchange of pairs makes the two models agree.
+    # A joint without a partner cannot agree.
     if best.only_a or best.only_b:
         return best
     tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)
@@ -758,11 +757,11 @@ def _best_alignment(
     ).find_best()
 
 
-#: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
+#: Full turns that may fit a zero offset to the mimic rules.
 FULL_TURNS = (0, 1, -1)
-#: Tolerance of a joint's zero offset, as a multiple of the angle tolerance.
-#: The factor is large, because urdfkin computes a zero offset from the axes of two joints.
-#: If these axes are close to each other, the computed zero offset is inexact.
+#: Tolerance of a zero offset, in angle tolerances.
+#: A zero offset is computed from the axes of two joints.
+#: It is inexact if these axes are close.
 OFFSET_FACTOR = 1e4
 
 
@@ -817,8 +816,8 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # The rules of each joint pair require y = alpha x + beta.
-        # Only the joint pairs with the most frequent alpha get a new zero offset.
+        # The rules of a joint pair require y = alpha x + beta.
+        # Only pairs with the most frequent alpha get a new offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

@@ -62,7 +62,7 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
+#: Largest perpendicular component of a parallel unit vector.
 PARALLEL_TOLERANCE = 1e-12
 
 
@@ -129,7 +129,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 _POSE_TOLERANCE = 1e-9
-#: Test coordinates (m, m, rad) of a planar joint; each coordinate differs from 0.
+#: Nonzero test coordinates of a planar joint (m, m, rad).
 _TEST_COORDINATES = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -608,7 +608,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # A matched pair of links on these bodies gives the transform from B's body to A's body.
+            # Two matched links give the transform from B's body to A's.
             T_a_b = known.end @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
@@ -653,7 +653,7 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: Prescribed values without changes: A and B have equal root poses, and equal coordinates for each joint.
+#: Equal root poses, and equal coordinates of each joint.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -688,14 +688,14 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: The value of B's joint, measured with the positive direction and the zero position in B's URDF.
-    #: The formula is b_unconverted = sense * b + offset.
+    #: Joint value with the sign and zero of B's URDF:
+    #: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
-    #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: `rounding` (rad or m) is then max(0, D - E).
-    #: D is the absolute difference between the constants of the two computed functions.
+    #: If only rounding separates the functions, `b` is `a`, and
+    #: `rounding` (rad or m) is max(0, D - E).
+    #: D: absolute difference of the constants of both functions.
     #: E is the rounding error of one joint.
-    #: If the functions differ by more than rounding, `rounding` is 0.
+    #: Otherwise, `rounding` is 0.
     rounding: float = 0.0
 
     @property
@@ -849,7 +849,7 @@ class _VariablesBuilder:
                     restrict(k, line.variable, (low, high))
                 else:
                     mimic.add(line.variable)
-        # A joint that only one model has can be mimicked by a joint that both models have.
+        # A matched joint can mimic an unmatched joint.
         for k, unpaired in enumerate((self.alignment.only_a, self.alignment.only_b)):
             for joint in (self.trees[k].joints[j] for j in unpaired):
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:

@@ -72,7 +72,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray, pose
 
 _FULL_TURN = 2.0 * math.pi
-#: Number of corners of a regular polygon around a circle; its corners are 0.1 % outside the circle.
+#: Corners of a polygon around a circle, 0.1 % outside it.
 _CORNERS = 64
 
 
@@ -236,10 +236,10 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: `FINE_GRID` gives a smaller bound than `COARSE_GRID`, but takes longer.
+#: `FINE_GRID` gives smaller bounds, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
-#: Maximum number of sample values of a revolute joint's variable.
-#: If a range would need more samples, the joint's angles in A and B are treated as independent.
+#: Maximum number of sample values of a revolute joint.
+#: For a larger range, the angles in A and B count as independent.
 MOST_VALUES = 1024
 
 
@@ -260,7 +260,7 @@ def upper_bounds(
     if any(step.kind_difference and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _angle_bound(steps, pairs, variables, frame)
-    if not steps:  # no joint differs, so the distance is equal in all configurations
+    if not steps:  # no joint differs, so the distance is constant
         d = frame.end[:3, :3] @ frame.zero_pose[:3, 3] + frame.end[:3, 3] - frame.zero_pose[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _distance_bound(steps, pairs, variables, frame, grid), radians
@@ -296,7 +296,7 @@ def _angle_bound(
         if step.kind != "turns" or pair is None:
             continue
         if step.axis_b is not step.axis_a:
-            # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes.
+            # R: the joint's rotation by t. Q: rotation by the tilt s.
             # For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
@@ -346,7 +346,7 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    # The rotation of a planar or floating joint has no limits, so the bound allows every direction of d.
+    # Planar and floating joints allow every direction of d.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.lengths)
@@ -524,7 +524,7 @@ def curvature(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For a prismatic joint i, `bound` can be 0 although the joint values in A and B differ.
+        # For a prismatic joint i, `bound` can be 0 for different values.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:

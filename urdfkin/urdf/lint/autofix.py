@@ -35,10 +35,10 @@ from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, Robot
 from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
-#: In one pass, all applied fixes belong to findings with the same code, and do not overlap.
+#: The fixes of one pass have the same code.
 MAX_PASSES = 100
 
-#: If the numbers of a unit vector are rounded to doubles, the vector rotates by at most this angle (rad).
+#: Maximum rotation of a unit vector by rounding to doubles, rad.
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
@@ -92,7 +92,7 @@ def fix_text(
 
 def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # `findings` contains only some findings of a very frequent code. Such codes are not compared.
+    # For very frequent codes, `findings` is incomplete.
     many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -125,7 +125,7 @@ def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str,
 
 
 def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str | None:
-    # If roll, pitch or yaw changes by an angle, the frame rotates by at most this angle.
+    # A change of roll, pitch or yaw rotates the frame at most this much.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
@@ -139,7 +139,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that covers the rounding errors of `Fix.max_rotation`, which is a sum of doubles.
+#: Factor for the rounding errors of the sum `Fix.max_rotation`.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -168,9 +168,9 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     return None if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
-#: Number of bytes in each line of git's binary patch.
+#: Bytes per line of git's binary patch.
 _BYTES_IN_A_LINE = 52
-#: In git's binary patch, the first letter of a line encodes the number of bytes of the line.
+#: First letters of lines in git's binary patch, for the number of bytes.
 _LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
@@ -192,9 +192,9 @@ def _relative_path(file: str) -> str:
 
 
 def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
-    end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
+    end = "\t" if " " in name else ""  # Git needs a tab after names with spaces.
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
-    # Like git, StringIO ends a line only at a line feed.
+    # Like git, StringIO ends lines only at line feeds.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
     found = difflib.unified_diff(a, b, old, new)
     no_end = "\n\\ No newline at end of file\n"

@@ -132,7 +132,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Maximum number of characters in a line of a printed example.
+#: Maximum line length of a printed example.
 _MAX_EXAMPLE_WIDTH = 100
 #: Width of prose on a terminal, in characters.
 PROSE_WIDTH = 88

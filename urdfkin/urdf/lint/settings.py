@@ -37,7 +37,7 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examination, find_local_path
 from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
-#: Version of the baseline format. The number changes if a field is removed or gets another meaning.
+#: Version of the baseline format; it changes if a field loses its meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -126,7 +126,7 @@ _TYPE_NAMES = {
     str: "a string",
 }
 
-#: Default patterns of robot files, without .xacro, because most .xacro files describe only a part of a robot.
+#: Patterns of robot files; most .xacro files describe only parts.
 DEFAULT_INCLUDE = ("*.urdf",)
 
 
@@ -248,7 +248,7 @@ class FindingFilter:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
+            # Each baseline must count the finding, so `any` is wrong.
             return selected and not sum(baseline.consume(finding) for baseline in known)
 
         return is_reported
@@ -279,7 +279,7 @@ def find_known_findings(
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # If the xacro file or a file that it may include has changed, all findings count as new.
+        # After a change of an included file, all findings count as new.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
@@ -292,7 +292,7 @@ def find_known_findings(
     return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
 
 
-#: ROS's build tools and urdfkin skip a folder that contains a file with one of these names.
+#: Build tools of ROS skip folders with one of these files.
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

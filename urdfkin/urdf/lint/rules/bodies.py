@@ -15,19 +15,19 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: A mass (kg) is reported as too large if its absolute value exceeds `MAX_MASS`.
-#: A centre of mass is reported if the absolute value of a coordinate (m) exceeds `MAX_COORDINATE`.
+#: Largest plausible mass, kg.
+#: Largest plausible coordinate of a centre of mass, m.
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
-#: A nonzero mass (kg) below this number is probably a placeholder.
-#: If the mass of a body is probably a placeholder, the moments of inertia are not checked.
+#: A smaller nonzero mass (kg) is probably a placeholder.
+#: Such a body's moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance for the moments of inertia of a body, per kg of the body's mass (m^2).
-#: Only bodies smaller than about 0.03 mm have moments of inertia below this tolerance.
+#: Tolerance of moments of inertia per mass, m^2.
+#: Smaller moments belong to bodies below about 0.03 mm.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of the moments of inertia in a file.
+#: Relative rounding error of moments of inertia.
 #: Exporters write moments of inertia with few digits.
 _MOMENT_PRECISION = 1e-6
 
@@ -132,7 +132,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape: the name, the count of numbers, and whether the attribute is required.
+#: Numeric attributes of shapes: name, count, whether required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

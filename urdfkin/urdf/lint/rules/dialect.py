@@ -32,7 +32,7 @@ XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
 NO_LINKS = Rule("URDF205", "no-links", ERROR)
 NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
-#: Elements of SRDF, a format of files that supplement a URDF.
+#: Elements of SRDF files, which supplement a URDF.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # A macro can change the kinematics only if the macro is directly inside <robot> or inside a joint.
+    # Only macros inside <robot> or a joint can change the kinematics.
     if _report_xacro(
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
     ):
@@ -95,7 +95,7 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element and the name of an attribute; the name is None if the element itself is meant.
+#: An element and an attribute; None means the element itself.
 _Occurrence = tuple[Element, str | None]
 
 
@@ -141,10 +141,10 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements, which may have any content, even `<joint>` and `<link>`.
+#: Extension elements may contain anything, even `<joint>` and `<link>`.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
-#: Elements and attributes of simulators and vendors that are common in URDF files.
+#: Common elements and attributes of simulators and vendors.
 _COMMON_EXTENSIONS = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
@@ -152,8 +152,8 @@ _COMMON_EXTENSIONS = (
 EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: If a line has no colon, the attributes of the element are not checked.
-#: If an element has no line, its content is not checked.
+#: Without a colon, attributes are not checked.
+#: Elements without a line may have any content.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -183,11 +183,11 @@ ATTRIBUTES = {
 #: Tags and attributes for poses in other formats. URDF readers skip these names.
 _POSE_NAMES_ELSEWHERE = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Names that URDF, a simulator or another format defines for an element or an attribute.
-#: `--fix` does not remove an unknown attribute with one of these names.
+#: Names that URDF, a simulator or another format defines.
+#: `--fix` does not remove attributes with these names.
 _DEFINED_ELSEWHERE = frozenset().union(*ATTRIBUTES.values()) | _POSE_NAMES_ELSEWHERE | EXTENSIONS
 
-#: Child elements that may occur only once in an element, by the tag of the element.
+#: Child elements that may occur only once.
 _SINGLE_CHILDREN = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
@@ -196,7 +196,7 @@ _SINGLE_CHILDREN = {
 #: Elements in which text between the tags is reported.
 _ELEMENTS_WITHOUT_TEXT = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
-#: Elements in which text between the tags is probably a value that belongs in an attribute.
+#: Elements whose text probably belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
@@ -266,7 +266,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: A tag with at least this number of characters is too long to be a misspelt `link` or `joint`.
+#: Longer tags cannot be a misspelt `link` or `joint`.
 _MAX_TAG_LENGTH = 8
 
 
@@ -330,7 +330,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: Tags with these beginnings are reported by the rules URDF202 and URDF112.
+#: URDF202 and URDF112 report tags with these beginnings.
 _PREFIXES_OF_OTHER_RULES = ("xacro:", "xi:include")
 
 
@@ -382,7 +382,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Names with more characters are reported, because long names break tables and file paths.
+#: Longer names break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 
@@ -443,7 +443,7 @@ def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]
     seen: dict[str, str] = {}
     for name, element in named_elements:
         if name.isascii() or len(name) > MAX_NAME_LENGTH:
-            continue  # Long names are slow to compare, and URDF405 already reports long names.
+            continue  # URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:

@@ -118,7 +118,7 @@ def _check_root(report: Reporter, robot: RobotRecord) -> bool:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
-    # If the child link of a joint does not exist, each link without a parent may be the intended child.
+    # Each link without a parent may be the intended child.
     if not children <= robot.links.keys():
         return False
     parents = {joint.parent for joint in robot.joints}
@@ -136,21 +136,21 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, the finding is a note.
-#: If the numbers of an axis have few digits, the length of the axis differs slightly from 1.
+#: Smaller errors of an axis length are notes.
+#: Rounding to few digits causes such errors.
 NOTE_LENGTH_ERROR = 2e-4
 
-#: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
+#: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: An axis counts as the z axis if its xy part is at most this fraction of its z component.
+#: Largest xy part of a z axis, relative to z.
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
-#: The number is the default tolerance of Eigen's function `isApprox`.
+#: Tolerance with which Pinocchio replaces an axis by a coordinate axis.
+#: This is the default of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: If an axis differs from a coordinate axis by at most this angle (rad), the difference is not reported.
+#: Smaller angles to a coordinate axis (rad) are not reported.
 #: The error bounds in `verify.bounds` cover this difference.
 _NEGLIGIBLE_TILT = 2.0**-52
 
@@ -269,7 +269,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks the limits of all joint types.
+    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks limits of all joints.
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -325,10 +325,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: A mimic joint's multiplier or offset (rad or m) is too large if its absolute value exceeds this number.
+#: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: URDF527 is reported if the limits of a mimic joint exclude more than this fraction of the mimicked
-#: joint's range. Limits with few digits often exclude a small fraction of the range.
+#: Fraction of the mimicked joint's range; larger exclusions cause URDF527.
+#: Limits with few digits exclude small fractions.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -431,9 +431,9 @@ class _MimicChecker:
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        # `restrict_range` narrows the allowed range by a rounding error at each end.
-        # If the limits allow only one end of the range, the narrowed range can be empty.
-        # The next line therefore calls `restrict_range` for each end alone.
+        # `restrict_range` subtracts a rounding error at each end.
+        # A range of one value would become empty.
+        # Each end is therefore tested alone.
         single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
         allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
         message = (
@@ -502,26 +502,25 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: A joint origin with a coordinate of at least this number (m) is probably in millimetres.
+#: Larger coordinates of a joint origin (m) are probably millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
+#: Below this total length (m), lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT`.
+#: Whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
 #: `PLACEHOLDER_LIMIT` itself is excluded.
-#: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
+#: Some exporters write larger limits for joints without limits.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: An angle of 1.57 instead of pi/2 displaces the links after the joint.
-#: The finding is a warning if the displacement exceeds this length (m).
+#: An angle of 1.57 instead of pi/2 displaces later links.
+#: Larger displacements (m) are warnings.
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: If an angle differs from a multiple of pi by at most this number (rad), the difference is not reported.
+#: Smaller differences from a multiple of pi (rad) are not reported.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs of a factor k and a number of decimals.
-#: An angle in a file counts as a rounded k * pi only if the angle has at least this number of decimals.
+#: Factor k, and minimum number of decimals of a rounded k * pi.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]

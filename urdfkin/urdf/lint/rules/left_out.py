@@ -39,19 +39,19 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Only this many bytes at the beginning of a file are searched for elements.
+#: Number of bytes that are searched for elements.
 _MAX_SEARCHED_BYTES = 10_000_000
-#: Beginnings and ends of XML markup that is not an element.
+#: Beginnings and ends of XML markup without elements.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements. A finding about such an element does not contain the name of the element.
-#: The key is the tag in the file, and the value is the tag in the finding.
+#: Tags of MJCF elements whose findings contain no name.
+#: Keys are tags in the file; values are tags in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Pattern that matches the beginning of a prim in a USD text file, or a delimiter.
-#: A delimiter is a parenthesis, a brace, or the beginning of a comment, a string, a reference or an array.
+#: Beginning of a prim in a USD text file, or a delimiter.
+#: Delimiters are parentheses, braces, comments, strings, references and arrays.
 _PRIM_OR_DELIMITER = re.compile(
     rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
 )
-#: Beginnings and ends of comments, arrays, strings and references in a USD text file.
+#: Beginnings and ends of comments, arrays, strings and references in USD.
 _SKIPPED_TEXT = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -59,7 +59,7 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line (from 1), column (from 1) and width of each element, by tag and name.
+#: Line, column (from 1) and width of each element.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
