@@ -49,7 +49,10 @@ MAX_HAYATI_TILT = 0.35
 
 @dataclass(frozen=True, slots=True)
 class AxisTransform:
-    """Transform between two joint axes."""
+    """Numbers of the transform A between two joint axes (m, rad).
+
+    `phi_is_free`: the axes do not determine phi.
+    """
 
     phi: float = 0.0
     delta: float = 0.0
@@ -87,9 +90,12 @@ def find_axis_transform(
     offset_in_delta: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
-    """Factor the transform between two axes.
+    """Factor the transform A between two axes.
 
     Tilts and lengths within `noise` become zero.
+    `default_phi` is used if the axes do not determine phi.
+    The offset along parallel axes becomes `delta_next`, or `delta` with `offset_in_delta`.
+    `reach` is the length of the path (m).
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_sine(A)
@@ -130,6 +136,7 @@ def _find_parallel_transform(
 def find_hayati_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
 ) -> AxisTransform:
+    """The x axis points to the intersection of the next axis with the xy plane."""
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -166,9 +173,10 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Consecutive axes with a reference row.
+    """Two consecutive joint axes, and the first joint's row in a reference table.
 
-    `delta_in` is the offset from the DH frame to the joint's frame (m).
+    `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
+    The argument `delta_in` is the offset from the DH frame to the joint's frame (m).
     """
 
     A: FloatArray
@@ -200,7 +208,7 @@ class PairWithReference:
 
     @property
     def hayati_offset(self) -> float | None:
-        """Offset of the row's x axis along the first axis.
+        """Offset (m) along the first axis to the x axis of a Hayati row.
 
         None: parallel axes in the path or in the reference, or |offset| > reach.
 
@@ -225,7 +233,7 @@ class PairWithReference:
         return offset if abs(offset) <= self.reach else None
 
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
-        """Ignore `d` if the axes determine the offset."""
+        """Return the transform for the offset `d` (m); `d` is ignored if the axes determine the offset."""
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
             return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
@@ -248,6 +256,9 @@ def match_axis_transforms(
 
     Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint.
     `tip_offset` is the required `delta_in` of the last joint; None: any.
+
+    Returns:
+        The transforms, and theta of each pair's first joint.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -300,7 +311,7 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Match theta of row i, or of the prismatic joints that follow."""
+    """Choose phi to match theta of row i, or of the following prismatic joints."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -364,6 +375,8 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
+    """Angles and lengths of a constant pose up to these values count as rounding errors."""
+
     radians: float
     metres: float
 
@@ -372,7 +385,8 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     """Bound the rounding errors of a constant pose.
 
     The pose is a product of `joints` joint origins.
-    `length` is the sum of the origins' lengths (m).
+    `length` is the sum of the lengths of their translations (m).
+    `reach` is the length of the whole path (m).
     The bound covers angles rounded to fifteen digits.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
@@ -393,7 +407,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Bound the orientation error from tilts set to zero."""
+    """Bound the orientation error (rad) from tilts set to zero."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

@@ -51,8 +51,8 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
+#: Limits for a prismatic joint without limits (m, m/s and N).
 #: URDF requires limits for prismatic joints.
-#: Limits of a prismatic joint without limits (m, m/s and N).
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
@@ -86,7 +86,7 @@ def to_urdf(table: DHTable) -> str:
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Return a tree without joint limits and mimic rules."""
+    """Return a tree without joint limits and mimic rules, with one coordinate per row."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return make_serial_tree(table.robot, link_names(table), joints)

@@ -41,7 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance of a right angle, rad; 1.571 is a right angle.
+#: Tolerance of a right angle, rad; 1.571 counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {
@@ -83,6 +83,7 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
 
     `like` is a standard table of the same joints.
     With `like`, `options.sign` has no effect.
+    `options.parallel_offset` then has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -157,6 +158,7 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
+    """A prismatic joint determines only the direction of its axis, so the axis can be shifted."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -186,7 +188,7 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Avoid a common normal far away from the robot."""
+    """Shift a nearly parallel axis, to avoid a common normal far away from the robot."""
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -214,7 +216,7 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     """Find frame 0.
 
     Returns:
-        T_base_0, and the angle and offset to joint 1.
+        T_base_0, and the angle about and offset along z_0 to joint 1.
     """
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
@@ -308,7 +310,7 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a and alpha, and adjust the tool.
+    """Copy theta, a and alpha from the reference, and adjust the tool.
 
     If the reference has d = 0, d becomes 0.
     Nothing is copied if neither table has a tool and theta nearly agrees.
@@ -334,7 +336,7 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
-    """Whether the table needs no tool.
+    """Whether the last row can contain A, so that the table needs no tool.
 
     standard   A = Rz Tz Tx Rx
     modified   A = Rz Tz
@@ -356,7 +358,7 @@ def _make_last_row(
     options: DerivationOptions,
     noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """`A` is the tip's pose relative to the origin O_{n-1}."""
+    """`A` is the tip's pose in a frame with origin O_{n-1} and the last joint's axes."""
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = clean_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)

@@ -118,7 +118,7 @@ def make_dh_table(
         base: A link or joint frame; None: the root.
         convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
         near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
-            four parameters, and lengths may be kilometres.
+            four parameters, and offsets may be kilometres.
         snap: Largest change (rad) of an angle that becomes a multiple of 15 degrees. The table's attribute
             `snap` reports the effect.
         last: "tip": the last row ends at the tip if possible. "flange": the tool leads from the last axis
@@ -143,7 +143,7 @@ def make_dh_table(
         RangeError: the square of a length overflows.
     """
     exact = make_chain(tree, tip, base)
-    # Pinocchio's poses are relative to the root.
+    # Pinocchio computes poses from the root, so the whole path is checked.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]

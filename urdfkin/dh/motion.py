@@ -34,7 +34,7 @@ def jacobian(
     """Return the tip's Jacobian (equation 7.85).
 
     The world is the table's base frame.
-    `q` (..., coordinates) is in the order of `joint_names`.
+    `q` (..., coordinates) is in the order of `joint_names` (rad or m).
 
     Returns:
         (..., 6, coordinates), [linear; angular].
@@ -52,6 +52,8 @@ def velocity(
 ) -> FloatArray:
     """Return the tip's velocity (equations 7.127, 7.128).
 
+    `v` is in rad/s or m/s.
+
     Returns:
         (..., 6), [linear; angular].
     """
@@ -67,6 +69,8 @@ def acceleration(
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
     """Return the tip's classical acceleration (equations 7.129, 7.130).
+
+    `a` is in rad/s^2 or m/s^2.
 
     Returns:
         (..., 6), [linear; angular].

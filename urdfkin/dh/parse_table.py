@@ -207,7 +207,7 @@ def _parse_bars(lines: list[str]) -> _Grid | None:
 
 
 def _parse_separated(lines: list[str]) -> _Grid | None:
-    """Parse CSV."""
+    """Parse cells separated by semicolons, tabs or commas."""
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
     grids = (
         _find_grid(lines, partial(_split_csv_line, separator=separator), separator)
@@ -221,7 +221,7 @@ def _split_csv_line(line: str, separator: str) -> list[str]:
 
 
 def _parse_aligned(lines: list[str]) -> _Grid | None:
-    """Parse cells separated by blanks."""
+    """Parse cells separated by two or more blanks, otherwise by one."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -290,7 +290,7 @@ def _find_convention(grid: _Grid) -> str | None:
 
 
 def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
-    """Parse a pose printed by urdfkin."""
+    """Parse a pose printed by urdfkin, as text or as a LaTeX matrix."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
         return _nearest_rigid(
@@ -305,7 +305,7 @@ def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Make a rounded rotation exact."""
+    """Replace a rounded rotation by the nearest rotation matrix."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -376,7 +376,10 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
-    """Replace another joint's variable by a mimic rule."""
+    """Replace another joint's variable by a mimic rule.
+
+    Variable qi is the i-th name in `coordinates`; without names, the joint of row i.
+    """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
     names = coordinates or joints
@@ -409,7 +412,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """A .txt file that begins with "<" is a URDF."""
+    """Whether a source is a table file; a .txt file that begins with "<" is a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:

@@ -74,7 +74,7 @@ class NumberWithText(float):
 
 
 def half_digits_by_row(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of each cell's last digit.
+    """Return half a unit of each cell's last digit (m or rad), by row.
 
     `data` must be a result of `urdfkin.dh.parse_table.mapping_from_text`.
     """
@@ -93,7 +93,7 @@ def _half_digit_in_si(name: str, value: object, units: Units) -> float:
 
 
 def half_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of a number's last digit.
+    """Return half a unit of a number's last digit; 0 for an exact number.
 
     A whole number is exact unless `whole_is_rounded`.
 
@@ -117,7 +117,7 @@ def name_cells(row: Sequence[Any]) -> dict[str, Any]:
 
 
 def parse_row(row: Any, index: int, units: Units) -> DHRow:
-    """`index` begins at 0."""
+    """Parse a handwritten row; `index` begins at 0."""
     if isinstance(row, DHRow):
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
@@ -139,7 +139,8 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles are usually multiples of 15 degrees; lengths rarely are.
+    Angles are usually multiples of 15 degrees.
+    Lengths are rarely multiples of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):

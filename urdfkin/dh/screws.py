@@ -42,10 +42,9 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws and of M.
-#: Tolerance of the length of an axis vector.
-#: Tolerance of the pitch of a screw, m/rad.
-#: Tolerance of the entries of R R^T - I, R the rotation in M.
+#: Tolerance of handwritten screws and of M, for three numbers:
+#: difference of an axis vector's length from 1; pitch of a screw, m/rad;
+#: entries of R R^T - I, where R is the rotation in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -257,7 +256,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """An exact M is unchanged."""
+    """Return the rigid transform nearest to M; an exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -281,12 +280,13 @@ def screws_from_rows(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws.
 
+    A joint is revolute if w is not 0, otherwise prismatic.
     URDF has no joint with a pitch, so w . v must be 0.
 
     Args:
         screws: (n, 6) rows (w, v); also (6, n) if n is not 6.
-        M: (4, 4) or (3, 4) zero pose, m.
-        frame: "space" or "body".
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, m.
+        frame: Frame of the screws: "space" (base) or "body" (tip).
         joints: Joint names.
         robot: The robot's name.
         base_frame: The base frame's name.

@@ -37,7 +37,8 @@ from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
-#: Above 7.5 degrees, two multiples of 15 degrees would be possible.
+#: Largest permitted tolerance, rad.
+#: Above 7.5 degrees, an angle could become either of two multiples of 15 degrees.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Assumed range of mimicked joints outside the path, rad or metres.
@@ -127,7 +128,7 @@ def sample_within_limits(table: DHTable) -> FloatArray:
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
-    """Return the angles between rotations.
+    """Return the angles (rad) between rotations (..., 3, 3).
 
     |R - S| = 2 sqrt2 sin(angle / 2)
     """
@@ -167,7 +168,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     """Snap the angles of Rz(phi) Rx(tilt) Rz(psi).
 
     Returns:
-        The new pose, and the angle of change.
+        The new pose, and the angle from the old to the new rotation (rad).
     """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
@@ -222,6 +223,7 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
+    """The change rotates the chain after joint k (from 1) about the joint's origin."""
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
 
@@ -240,7 +242,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
 
 
 def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Find angles near round values, and lengths near 0.
+    """Find angles near multiples of 15 degrees, and lengths near 0.
 
     Returns:
         (joint, cell, deviation) tuples.
@@ -258,6 +260,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, make_snapped_table: Callable[[float], DHTable]) -> str | None:
+    """Recommend the tolerance that leaves the fewest noisy cells."""
     noisy = find_noisy_cells(table) if table.snap is None else []
     if not noisy:
         return None

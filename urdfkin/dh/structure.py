@@ -58,8 +58,8 @@ class AxisPair:
     """Two consecutive axes.
 
     Attributes:
-        angle: At most pi/2.
-        distance: 0 if a joint is prismatic.
+        angle: Angle between the axes, at most pi/2 rad.
+        distance: Distance of the axes, m; 0 if a joint is prismatic.
     """
 
     first: str
@@ -75,7 +75,7 @@ class StructureKind:
     Attributes:
         radians: Largest deviation of an angle.
         metres: Largest deviation of a length.
-        at: Intersection in the base frame (zero configuration).
+        at: Intersection of the axes in the base frame and zero configuration, m.
     """
 
     name: str
@@ -97,9 +97,9 @@ class Structure:
     Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
     Attributes:
-        reach: Upper bound (m), infinite for unlimited prismatic joints.
+        reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
         sampled_reach: Largest sampled distance, m.
-        reach_from: Fixed point in the base frame.
+        reach_from: Point in the base frame (m), independent of q.
         reach_point: Description of `reach_from`.
     """
 
@@ -165,7 +165,7 @@ def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -
     """Return the least-squares intersection of axes.
 
     Returns:
-        The point, and the largest distance to an axis.
+        The point, and its largest distance to an axis (m).
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
@@ -282,7 +282,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     """Sample tip positions without mimic rules.
 
     Returns:
-        Positions, and one Jacobian.
+        Positions, and the Jacobian of the first sample.
     """
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
@@ -343,7 +343,7 @@ class OpwParameters:
 def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameters:
     """Find the OPW parameters.
 
-    `tolerance` is the largest error of the tip (m and rad).
+    `tolerance` is the largest allowed error of the tip (m and rad).
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -377,7 +377,7 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield an OPW table for each choice of signs.
+    """Yield an OPW table for each choice of the signs of a1, a2 and b.
 
     The lengths are approximate.
     """
@@ -396,7 +396,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read_parameters(table: DHTable) -> OpwParameters:
-    """`table` must match a reference table of `_candidate_tables`."""
+    """`table` comes from `derive_matching_table` with a reference from `_candidate_tables`."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -408,7 +408,7 @@ def _read_parameters(table: DHTable) -> OpwParameters:
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the axes h_i and the vectors P_i.
 
-    All joints must be revolute.
+    All joints must be revolute. P_0 begins at the base, and P_n ends at the tip.
     Solvers detect intersecting axes by an exactly zero vector.
 
     Returns:
@@ -419,7 +419,10 @@ def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatAr
 
 
 def _shared_points(screws: ProductOfExponentials) -> FloatArray:
-    """Intersecting axes have the same point."""
+    """Return a point of each axis; intersecting axes have the same point.
+
+    Three axes have priority over two, and later intersections over earlier ones.
+    """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):
         for i in reversed(range(n - size + 1)):

@@ -165,7 +165,7 @@ _RIGID_TOLERANCE = 1e-6
 
 
 def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return S = Rz(theta) Tz(d).
+    """Return S = Rz(theta) Tz(d); radians and metres.
 
     Returns:
         (..., 4, 4) poses; the arguments broadcast.
@@ -181,7 +181,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """Return X = Tx(a) Rx(alpha) Ry(beta)."""
+    """Return X = Tx(a) Rx(alpha) Ry(beta); metres and radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [
@@ -213,7 +213,7 @@ def is_identity(T: FloatArray) -> bool:
 
 
 def angle_difference(first: float, second: float) -> float:
-    """Return first - second, in [-pi, pi]."""
+    """Return first - second modulo 2 pi, in [-pi, pi]."""
     return math.remainder(first - second, 2.0 * math.pi)
 
 
@@ -269,7 +269,7 @@ class SnapChange:
 
     @property
     def tip_displacement(self) -> float:
-        """Bound in metres, with prismatic joints at zero."""
+        """Bound of the tip's displacement (m), with prismatic joints at zero."""
         return self.angle * self.lever
 
 
@@ -311,7 +311,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a bound of the tip's displacement.
+        """Return a guaranteed bound (...,) of the tip's displacement (m).
 
         `values` are the prismatic joints' values by name.
         """
@@ -536,11 +536,11 @@ class DHTable(Displayable):
     # -- placement -----------------------------------------------------------------------------------
 
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the (..., n + 1, 4, 4) poses of the frames 0 to n.
+        """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, or values by name (mapping or text).
-                None: the zero configuration.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
+                text). None: the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -571,7 +571,8 @@ class DHTable(Displayable):
         The pose is the product of base, rows and tool.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names`, or values by name (mapping or text).
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
+                text).
 
         Raises:
             InputError: `q` has the wrong length.

@@ -53,9 +53,9 @@ class TreeRow:
     The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Row index of the antecedent; -1 is the root.
+        antecedent: Row index of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        mimicked_joint: The joint's own name without a mimic rule.
+        mimicked_joint: The mimicked joint; without a mimic rule, the joint itself.
         multiplier: value = multiplier * mimicked value + offset
     """
 
@@ -80,9 +80,9 @@ class TreeParameters:
     """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) lengths from the root, m.
-        T_frame_link: (joints, 4, 4) URDF link frames.
-        zeroed_tilt: Largest sum of tilts set to zero, rad.
+        path_lengths: (joints,) path lengths from the root to the joint origins in the URDF, m.
+        T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
+        zeroed_tilt: Largest sum of the tilts set to zero on a path from the root, rad.
     """
 
     robot: str
@@ -107,10 +107,10 @@ class TreeParameters:
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """Return path lengths to the links.
+        """Return the path lengths from the root to the links at `q`.
 
         Returns:
-            The larger of the URDF's and the table's lengths.
+            (..., joints) lengths (m), the larger of the URDF's and the table's.
         """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -192,7 +192,9 @@ class _LinkAxis:
     """The axis frame of a link.
 
     Attributes:
-        zeroed_tilt: Sum of tilts set to zero, rad.
+        T_antecedent_axis: Pose in the antecedent's axis frame.
+        T_link_axis: Pose in the link's URDF frame.
+        zeroed_tilt: Sum of the tilts set to zero on the path from the root, rad.
     """
 
     antecedent: int
@@ -203,7 +205,7 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """The link of a fixed joint uses its own frame."""
+    """Return the axis frames; a fixed joint's link has its URDF frame."""
     links = list[_LinkAxis]()
     # For each link: (i, T_i_link, number of fixed joints from link i).
     # i is the moving link's own index, or the antecedent's index.
@@ -289,7 +291,7 @@ _FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), 
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
-    """Row numbers begin at 1; 0 is the root."""
+    """Return plain data (m, rad); row numbers begin at 1, and 0 is the root."""
     return {
         "notation": "Khalil-Kleinfinger",
         "robot": table.robot,

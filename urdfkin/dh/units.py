@@ -107,10 +107,10 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an exact multiple of pi/12.
+    """Return an angle as a fraction of pi.
 
     Returns:
-        The factor of pi; None for other angles.
+        None if the angle is not exactly a multiple of pi/12.
     """
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
