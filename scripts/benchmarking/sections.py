@@ -159,7 +159,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 # Steps of one configuration: time differences between seven lines of Python (`_calls`).
 # For example, `compute` rejects a tuple as `out`, and then omits the forward recursion.
 
-#: Instructions for each step of a batch.
+#: Instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -217,7 +217,7 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
 
 
 def call_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time (ns) of each step."""
+    """Yield the time (ns) of each step of a call for one configuration."""
     for workload, quantity, _ in _open_workloads("where", n):
         calls = list(_calls(workload, quantity))
         tasks = [call.make_single_task(workload, quantity) for call in calls]

@@ -45,7 +45,8 @@ class ChainJoint:
 
     Attributes:
         backwards: Whether the path leads from child to parent.
-        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`.
+        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. Its z axis is the joint's axis. If
+            `backwards` is true, z has the opposite direction.
         mimic: None for an independent joint.
     """
 

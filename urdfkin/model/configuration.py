@@ -52,15 +52,15 @@ from urdfkin.model.tree import (
 #: Some upper bounds assume this travel (m) of joints without limits:
 #: planar, floating, and prismatic joints.
 #: Few linear axes of robots are longer than 10 m.
-#: Such a bound also holds for a shorter travel.
+#: These upper bounds also hold for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: Text of the condition of such an upper bound.
+#: Condition of these upper bounds, as text.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
 @dataclass(frozen=True, slots=True)
 class RangeReduction:
-    """A range that the limits of mimic joints narrow.
+    """A mimicked joint's range, which the limits of mimic joints narrow.
 
     Attributes:
         allowed_range: None if mimic joints allow at most one value.
@@ -111,7 +111,7 @@ def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int 
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return joint ranges without the mimic joints' limits."""
+    """Return the ranges of joints with one coordinate; ignore limits of mimic joints."""
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
@@ -125,7 +125,7 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges that mimic joints allow.
+    """Return the joint ranges within the limits of mimic joints.
 
     If mimic joints allow at most one value, the range is not narrowed.
     """
@@ -158,7 +158,7 @@ def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
 
 
 def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """Return the range that a mimic joint's limits allow.
+    """Return the part of a range that a mimic joint's limits allow.
 
     If no value is allowed, the lower end exceeds the upper end.
     """
@@ -236,7 +236,7 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
-    """Return "rad", "m" or "" for each number.
+    """Return "rad", "m" or "" for each number of q, v or a.
 
     The time unit is omitted.
     """
@@ -317,7 +317,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
-    In `ready`, joints without a value are at 0 or mid-range.
+    In `ready`, joints without a value are at 0, or mid-range if 0 is outside.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -497,13 +497,13 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations in the search for degrees.
+#: Maximum number of configurations in the search for degrees.
 #: All configurations of a batch have the same unit.
 _MAX_CHECKED = 16
 
 
 def degrees_messages(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return messages about angles in degrees."""
+    """Return messages about values that seem to be degrees."""
     if tree.min_implausible_angle == math.inf or not q.size:
         return []
     if q.ndim == 2:
@@ -685,7 +685,7 @@ def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Draw random samples for a validation.
 
-    A mimic joint may exceed its limits, because the equations stay valid.
+    A mimic joint may exceed its limits: the equations are also valid there.
     Every eighth sample is fast: the quadratic terms of 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))

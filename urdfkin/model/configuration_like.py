@@ -209,7 +209,7 @@ with 'neutral, elbow=...'
 
 
 def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return text or a mapping; None for numbers.
+    """Return text or a mapping; None for other values.
 
     A table with labels becomes a mapping.
 

@@ -31,7 +31,7 @@ _SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the configuration after one second."""
+    """Return the configuration after one second at constant velocities."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, q_index, v_index in _coordinate_joints(tree):
@@ -95,7 +95,7 @@ def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Split `block` into linear and angular part.
+    """Split `block` into a linear and an angular part.
 
     The angular part is a quaternion for a floating joint's coordinates.
     """

@@ -21,7 +21,7 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, free
 
 @dataclass(frozen=True)
 class Coupling:
-    """The linear map values = G q + g of a path.
+    """The linear map from a path's coordinates to joint values: G q + g.
 
     >>> turn = JointKind.REVOLUTE
     >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
@@ -51,13 +51,13 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g."""
+        """The vector g of the joint values G q + g."""
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # The mimicked joint's unit is unknown here.
+        # The unit of a mimicked joint outside the path is unknown.
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
@@ -73,7 +73,7 @@ class Coupling:
     def values(self, q: ConfigurationLike) -> FloatArray:
         """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
-        # Each row of G has one nonzero number, so no product is needed.
+        # Each row of G has at most one nonzero number, so no matrix product is needed.
         return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:

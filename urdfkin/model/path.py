@@ -43,6 +43,8 @@ class ElementaryMotion:
 class Path:
     """A product of constant poses and elementary motions.
 
+    The amounts (..., motions) are angles (rad) or distances (m).
+
     >>> arm = Path((ElementaryMotion(2, turns=True), elementary_pose(0, False, 2.0)))
     >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
     [0.0, 2.0, 0.0]
@@ -83,7 +85,7 @@ class Path:
             yield T
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses at the end."""
+        """Return the poses (..., 4, 4) at the path's end."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         for T in self._after_each_step(amounts):  # noqa: B007
@@ -91,7 +93,7 @@ class Path:
         return np.array(T)
 
     def pose_and_jacobian(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the end's pose and Jacobian.
+        """Return the pose and Jacobian at the path's end.
 
         Returns:
             (..., 4, 4) pose and (..., 6, motions) Jacobian, [linear; angular].
@@ -101,7 +103,7 @@ class Path:
     def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
-        # A motion does not move its own axis.
+        # A motion does not move its own axis, so the frame after the motion gives the axis.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))

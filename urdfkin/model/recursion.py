@@ -44,8 +44,8 @@ class Column:
     """One Jacobian column of a joint.
 
     Attributes:
-        carrier: State of the frame that carries the axis.
-        order: Position on the path.
+        carrier: State of the frame to which the axis is fixed.
+        order: Position on the path, counted from the base.
         factor: Multiplier of the mimic rule.
     """
 
@@ -63,7 +63,7 @@ class Recursion:
 
     Attributes:
         eq: The textbook's equations.
-        own_axes: True for link axes, False for world axes.
+        own_axes: Axes of velocities and accelerations: link axes if True, else world axes.
     """
 
     eq: Any
@@ -195,7 +195,7 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivatives of the columns.
 
-        The sum of factor * x over (i, j, factor, x) is d(column i)/dq_j.
+        The tuples are (i, j, factor, x). For each i and j, the sum of factor * x is d(column i)/dq_j.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]

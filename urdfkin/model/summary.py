@@ -38,7 +38,7 @@ def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
 
 
 class JointTable(dict[str, Joint], Displayable):
-    """The joints by name."""
+    """A robot's joints by name, displayed as a table."""
 
     def __init__(self, tree: KinematicTree) -> None:
         super().__init__((joint.name, joint) for joint in tree.joints)

@@ -29,7 +29,8 @@ FloatArray = inputs.FloatArray
 class FrameName(str):
     """A frame's name with a prefix.
 
-    A plain string "link:NAME" can also be a full name.
+    `LinkFrame` always selects a link, and `JointFrame` a joint. A plain string "link:NAME" can also be the
+    full name of a link or joint.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
@@ -53,6 +54,8 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
+    """The name of a joint's frame, which is the child link's frame."""
+
     __slots__ = ()
     prefix = "joint:"
 
@@ -106,7 +109,7 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle; some wrists turn 400 degrees.
+#: Largest plausible joint angle, rad; some wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A joint value is far outside a limit if the excess is above
 #: `_FAR_DISTANCE` (rad or m)
@@ -133,7 +136,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 class Mimic:
     """The rule of a mimic joint.
 
-    The joint has the value multiplier * q_mimicked + offset.
+    The joint has the value multiplier * q_mimicked + offset. The mimicked joint is not a mimic joint.
     """
 
     mimicked_joint: str
@@ -153,7 +156,7 @@ class Joint:
         parent: Index of the parent link.
         T_parent_joint: Pose at q = 0, m.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) without axis.
-        tilt: Angle between `axis` and Pinocchio's axis, rad.
+        tilt: Angle between `axis` and Pinocchio's axis, rad. urdfkin's kinematics do not use this angle.
         lock: None unless the user fixed the joint.
     """
 
@@ -195,7 +198,7 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length of the offset from the parent link.
+        """Length of the offset from the parent link, m.
 
         The displacement of a locked prismatic joint is added.
         """
@@ -247,7 +250,7 @@ class KinematicTree:
 
     Attributes:
         links: The link `links[i + 1]` is the child of `joints[i]`.
-        joints: Joints in Pinocchio's order.
+        joints: All joints in Pinocchio's order; a parent link precedes its child link.
         poses: Named poses, each for some joints.
     """
 
@@ -321,7 +324,7 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Smallest and largest plausible angles, rad.
+        """Smallest and largest plausible angles (2, nq), rad.
 
         Only rotating joints with limits have finite entries.
         """
@@ -376,7 +379,7 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the frame's link.
 
-        A full name has priority over a prefix.
+        In a plain string, a full name has priority over a prefix.
         """
         if not isinstance(name, str):
             raise InputError(

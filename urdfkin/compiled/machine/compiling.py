@@ -214,7 +214,7 @@ class Kernel:
 
     def __getattr__(self, name: str) -> Any:
         # This method replaces a `cached_property`.
-        # Before Python 3.12, a fork could leave this lock locked.
+        # Before Python 3.12, a fork could leave the lock of a `cached_property` locked.
         if name != "compiled_function":
             raise AttributeError(name)
         with compile_lock:
