@@ -55,7 +55,7 @@ _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Maximum number of Tab presses per page, and of PDF pages.
+#: Maximum numbers of Tab presses per page, and of PDF pages as pictures.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
 #: Without a mouse, the site's theme hides some elements.
@@ -86,7 +86,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript: whether the border changes without focus.
+#: JavaScript: whether losing the focus changes the element's border.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -217,7 +217,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def open_page(browser: Browser, page: Page) -> None:
-    # Chromium does not reload for a change after `#`.
+    # Chromium does not reload if the address changes only after `#`.
     browser.chrome.get("about:blank")
     browser.chrome.get(page.url)
     if page.ready:
@@ -253,7 +253,7 @@ def check_screen(
     ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws a 3D view only on the screen.
+            # The browser draws a 3D view only while it is visible.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")

@@ -42,7 +42,7 @@ class BenchmarkSize:
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
-    numbers: int = 4_000_000  # Jacobian elements of a batch in the section `joints`
+    numbers: int = 4_000_000  # approximate number of Jacobian elements of a batch in the section `joints`
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames in one pass
     frame_configurations: int = 4_000  # configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
@@ -116,7 +116,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 if __name__ == "__main__":
     status = main()
-    if "roboticstoolbox" in sys.modules:  # the library prints warnings about memory leaks
+    if "roboticstoolbox" in sys.modules:  # at exit, this library prints warnings about memory leaks
         sys.stdout.flush()
         os._exit(status)
     sys.exit(status)

@@ -46,7 +46,7 @@ LENGTHS = (1, 2, 7, 8, 9, 100)
 THREADS = (None, 1, 2, 3)
 #: Maximum numbers of stored configurations and frames.
 STORED, STORED_FRAMES = 9, 6
-#: Configuration for plain Python and for kernels.
+#: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED_INDEX = 3
 MODES: tuple[ComputeMode, ...] = ("interpreted", "compiled")
 
@@ -99,7 +99,7 @@ def have_equal_bits(x: FloatArray, y: FloatArray) -> bool:
 
 
 def find_differences(subject: RobotInputs, now: Arrays) -> Iterator[str]:
-    """Yield a message for each difference."""
+    """Yield a message for each difference of batches, prepared frames and single calls."""
     frame = subject.frames[0]
     for call_name, quantity, reference, inputs in subject.calls():
         stored_inputs = [x[:STORED] for x in inputs]

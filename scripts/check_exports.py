@@ -53,7 +53,7 @@ _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 _OTHER_LANGUAGES = ("sympy-exact",)
 #: Maximum nv for a Hessian in a PyTorch or JAX file.
 #: The check of a larger Hessian is slow.
-#: JAX would compile the Hessian of an `array` file for minutes.
+#: An `array` file for JAX has no Hessian: JAX would compile the Hessian for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 
@@ -92,7 +92,7 @@ def error_ratios(code: FrameCode, folder: Path, languages: Collection[str]) -> I
 
 
 def _largest_ratio(found: Sequence[float], count: int) -> float:
-    """Return NaN if a ratio is NaN or missing."""
+    """Return the largest ratio; NaN if a ratio is NaN or missing."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 

@@ -45,7 +45,7 @@ from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints.
-#: It therefore computes only 6 tables with at most 4 rows.
+#: The package therefore computes only 6 tables with at most 4 rows each.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the Octave program, for each format.
@@ -172,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return each table's excess width (points)."""
+    """Return how much wider (points) each table is than the text."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -196,7 +196,7 @@ def _find_program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A table with poses from Pinocchio.
+    """A Denavit-Hartenberg table with poses from Pinocchio.
 
     Attributes:
         pinocchio_poses: Tip poses relative to the table's base.

@@ -42,7 +42,7 @@ ROUNDING = 1e-10
 
 
 def check_pair(name: str, change: str) -> dict[str, Any] | None:
-    """Return None if the change is impossible."""
+    """Check one change of a robot; return None if the change is impossible."""
     a, b = robot(name), changed(name, change)
     if b is None:
         return None

@@ -68,7 +68,7 @@ class Worker:
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a case, which may crash the process."""
+        """Test a case; a crash or timeout of the process is a result too."""
         if self.process is None:
             self.start()
         try:

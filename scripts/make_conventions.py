@@ -93,7 +93,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: Names in the package index that differ.
+#: Names in the package index that differ from the library's name.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "rtb": "roboticstoolbox-python",

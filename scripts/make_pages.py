@@ -66,7 +66,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Options of `urdfkin check` for sizes, with default and unit.
+#: Options of `urdfkin check` that limit sizes, with default and unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),

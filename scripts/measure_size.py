@@ -20,7 +20,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes (bytes) of packages.
+    """Return the sizes (bytes) of a package and its dependencies.
 
     Omit `without`, and packages that only `without` requires.
     """

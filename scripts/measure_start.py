@@ -33,7 +33,7 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 class Row:
     name: str  # label of the row on the page
     arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is a URDF file
-    max_ratio: float = math.inf  # time limit, in times of `import numpy, pinocchio`
+    max_ratio: float = math.inf  # time limit, divided by the time of `import numpy, pinocchio`
     empty_cache: bool = False  # True: the process finds no compiled kernels on disk.
 
 
@@ -70,7 +70,7 @@ def measure_seconds(words: Sequence[str], cache: Path | None) -> float:
 def measure_medians(rounds: int, folder: Path) -> list[float]:
     """Return each row's median processor time (s).
 
-    In the first round, Python compiles the modules to bytecode.
+    The first round does not count, because Python compiles the modules to bytecode.
     """
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())

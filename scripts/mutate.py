@@ -44,8 +44,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: The script changes Python modules, not files that Numba compiles.
-#: Numba reads the source text instead.
+#: Files that Numba compiles. The script skips these files.
+#: The script changes syntax trees, but Numba reads the source text.
 #: tests/laws/test_mutation.py tests mutants of these files without Numba.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",

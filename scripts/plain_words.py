@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Words that readers did not understand, with plain words.
+#: Regular expressions for words that readers did not understand, with replacements.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
     r"\b(stands?|stood) still\b": "fixed",

@@ -99,7 +99,7 @@ _SHORT = {
     "not compared": "not readable",
 }
 _QUOTED = 120
-#: MuJoCo then accepts bodies with no mass or impossible inertia.
+#: Settings with which MuJoCo accepts bodies without mass or with impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 
@@ -108,6 +108,7 @@ class RefusalError(Exception):
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
+    """Convert a URDF; return the tool's input file and output file."""
     reads, program, writes = TOOLS[tool]
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
@@ -156,7 +157,7 @@ def make_row(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tup
 
     | tool | second cell | third cell |
     |---|---|---|
-    | `urdf-usd-converter` | distance of the aligned models | effect of single precision |
+    | `urdf-usd-converter` | distance of the aligned models | distance due to single precision |
     | another tool | distance as written | angle as written |
     """
     try:

@@ -187,7 +187,7 @@ def find_indices(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def fill_columns(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Fill Jacobians with columns of zeros.
+    """Add columns of zeros to Jacobians.
 
     Column k of `J` becomes column `columns[k]`.
     """

@@ -21,8 +21,7 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Two times of a process's first result, ms.
-#: In one process, the kernel cache is empty. In the other process, the cache contains all kernels.
+#: Times until the first result, ms: with an empty kernel cache, and with all kernels in the cache.
 EMPTY, STORED = "empty_ms", "stored_ms"
 #: Methods of `Robot` that compile a kernel, with their inputs:
 #: 1: q; 2: q and v; 3: q, v and a.

@@ -7,7 +7,7 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: Colour, hatch and legend for each prefix of a name.
+#: Colour, hatch and legend for each prefix of a contender's name.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),

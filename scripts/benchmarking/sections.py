@@ -154,14 +154,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# A batch has several steps, for example the forward recursion.
-# The benchmark measures kernels for the first k steps.
-# Time of step k: time of k steps minus time of k - 1 steps.
-# For one configuration, the benchmark measures seven lines of Python (`_calls`).
-# For example, a tuple as `out` omits the forward recursion.
-# Time of a step: difference between two lines.
+# Steps of a batch, for example the forward recursion:
+# the time of step k is the time of the first k steps, minus the time of the first k - 1 steps.
+# Steps of one configuration: time differences between seven lines of Python (`_calls`).
+# For example, `compute` rejects a tuple as `out`, and then omits the forward recursion.
 
-#: Instructions for each step of a batch.
+#: Instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -219,7 +217,7 @@ def _make_kernel_task(workload: Workload, quantity: str, program: KernelProgram,
 
 
 def call_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time (ns) of each step."""
+    """Yield the time (ns) of each step of a call for one configuration."""
     for workload, quantity, _ in _open_workloads("where", n):
         calls = list(_calls(workload, quantity))
         tasks = [call.make_single_task(workload, quantity) for call in calls]

@@ -26,7 +26,7 @@ class TimedTask:
     """A timed task.
 
     Attributes:
-        n: Number of configurations that `compute` computes.
+        n: Number of configurations that one call of `compute` computes.
     """
 
     label: str
@@ -68,7 +68,10 @@ class DifferenceError(Exception):
 
 
 def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str) -> None:
-    """Compare all results with the result of `reference`."""
+    """Compare all results with the result of `reference`.
+
+    The computation is also the warm-up of each task.
+    """
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -144,7 +147,7 @@ class Calls:
     #: Lines that compute one result, the value of the last line.
     lines: tuple[str, ...]
     #: Lines that write the result of configuration k into `out[k]`.
-    #: None: `lines` compute it.
+    #: None: the value of the last line in `lines` is written into `out[k]`.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
     #: None: urdfkin's order of coordinates.

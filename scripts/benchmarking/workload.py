@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: Most joints of talos do not move this frame.
+#: Most joints of talos do not move `gripper_left_base_link`.
 ROBOT_FRAMES = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls.
 LOOP = 2_000
@@ -79,7 +79,8 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a copy without shapes and mimic rules.
 
-    Some libraries need inertias. Some libraries add a body `world`.
+    All links get the same inertia, because some libraries need inertias.
+    Links and joints named `world` are renamed, because some libraries add this body.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

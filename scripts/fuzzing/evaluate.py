@@ -36,12 +36,12 @@ SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Distance of the far base from the origin, m.
 FAR = 1e6
-#: Quantities of several frames, with their numbers of inputs.
+#: Quantities that one call computes for several frames, with their numbers of inputs.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
 class MismatchError(Exception):
-    """Two computations return different results."""
+    """Two computations of the same quantity return different results."""
 
 
 def evaluate(case: Case) -> Outcome:

@@ -43,7 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: Other families give mostly rejected mutants.
+#: `_STRUCTURE` occurs three times: urdfkin rejects most mutants of other families.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")

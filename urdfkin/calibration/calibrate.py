@@ -3,12 +3,16 @@
 A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameters that changed by more than
 two standard deviations are fitted again and written. The other parameters keep their original values.
 
-`read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
-The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. The
-columns T00 to T23, or T00 to T33, can contain the pose matrix instead of position and orientation. The
-command `urdfkin placement --format csv` writes such matrices. An .npz file contains the configurations q (n,
-nq). The poses are in T (n, 4, 4), or the positions are in p (n, 3). The array quat (n, 4) can contain the
-orientations that belong to p, as quaternions, scalar last.
+`read_poses` reads measured poses:
+
+| File | Content |
+|---|---|
+| CSV | a column for each coordinate, with the coordinate's name |
+| | position: x, y, z; optional orientation: qx, qy, qz, qw |
+| | or pose matrix: T00 to T23, or T00 to T33, as written by `urdfkin placement --format csv` |
+| .npz | configurations: q (n, nq) |
+| | poses: T (n, 4, 4) |
+| | or positions: p (n, 3); optional orientations: quat (n, 4), quaternions, scalar last |
 """
 
 from __future__ import annotations
@@ -90,17 +94,16 @@ class Calibration:
         identification: The parameters that are identifiable from the measured poses.
         general_identification: The parameters that are identifiable from random poses.
         full_fit: The fit; None without poses.
-        base_tool_fit: A fit of base and tool; all other parameters have their original values.
+        base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to the ratio u_measured /
-            u_random. Here u_measured is the parameter's uncertainty at the measured configurations, and
-            u_random is the parameter's uncertainty at equally many random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to u_measured / u_random. These
+            are the uncertainties at the measured configurations and at equally many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
-        written_fit: The fit of the written parameters; the other parameters have their original values.
+        written_fit: The fit of the written parameters; the others keep their original values.
         selected_parameters: Indices of the parameters that `written_fit` fits.
-        plausibility: The reasons why the fit is refused; empty for a plausible fit.
+        plausibility: The reasons why the fit is refused.
     """
 
     robot: Robot
@@ -124,7 +127,7 @@ class Calibration:
 
     @cached_property
     def changes(self) -> FloatArray:
-        """(p,) change of each parameter, m and rad; 0 for fixed parameters."""
+        """(p,) changes, m and rad; 0 for fixed parameters."""
         return self._change(self.full_fit)
 
     def _change(self, fit: Fit | None) -> FloatArray:
@@ -136,7 +139,10 @@ class Calibration:
 
     @cached_property
     def writable(self) -> frozenset[int]:
-        """Indices of the parameters that the file can store; a URDF cannot store base, tool and gains."""
+        """Indices of the parameters that the file can store.
+
+        A URDF cannot store base, tool and gains.
+        """
         is_table = isinstance(self.model.source, DHTable)
         pairs = enumerate(self.parameters)
         return frozenset(k for k, p in pairs if p.name != "gain" and (is_table or not p.is_base_or_tool))
@@ -147,7 +153,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """(p,) change of each parameter in the file that is written, m and rad."""
+        """(p,) changes in the written file, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property
@@ -160,12 +166,12 @@ class Calibration:
 
     @property
     def origins(self) -> dict[str, FloatArray]:
-        """The new origin (4, 4) of each joint whose origin moved, by joint name."""
+        """The new origin (4, 4) of each changed joint, by joint name."""
         return {} if self.written_fit is None else self.model.origins(self.written_fit.parameter_values)
 
     @property
     def base(self) -> FloatArray | None:
-        """(4, 4) pose of the robot's base in the instrument's frame; None if it was not fitted."""
+        """(4, 4) pose of the base in the instrument's frame; None if not fitted."""
         return (
             None
             if self.written_fit is None
@@ -174,7 +180,7 @@ class Calibration:
 
     @property
     def tool(self) -> FloatArray | None:
-        """(4, 4) pose of the target in the tip's frame; None if it was not fitted."""
+        """(4, 4) pose of the target in the tip's frame; None if not fitted."""
         return (
             None
             if self.written_fit is None
@@ -188,12 +194,16 @@ class Calibration:
 
     @cached_property
     def updated_urdf(self) -> UpdatedURDF:
-        """The original text of the URDF with the new origins, and the effect of the changes."""
+        """The original URDF with the new origins."""
         return UpdatedURDF(self.robot, self.origins)
 
 
 class ImplausibleError(InputError):
-    """The measured data or the model contain a gross mistake; `calibration` is the refused calibration."""
+    """The measured data or the model contain a gross mistake.
+
+    Attributes:
+        calibration: The refused calibration.
+    """
 
     def __init__(self, calibration: Calibration, remedy: str) -> None:
         model, plausibility = calibration.model, calibration.plausibility
@@ -224,9 +234,8 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
-    Afterwards urdfkin loads the written model, and compares the tip's poses with the poses that Pinocchio
-    computes. For a URDF, the poses are compared at the measured configurations. For a table, the poses are
-    compared at q = 0.
+    Pinocchio checks the tip's poses of the written model. A URDF is checked at the measured configurations,
+    and a table at q = 0.
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -235,21 +244,19 @@ def calibrate(
         poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m.
         tip: Name of a link or joint; the robot's tip when None.
         base: Name of a link or joint; the robot's base frame when None.
-        fit: Names of the sets of parameters to fit. "base": the pose of the robot's base in the instrument's
-            frame. "tool": the pose of the target on the tip. "offsets": the zero positions of the joints.
-            "origins": six numbers of each joint origin, or all cells of a table. "gains": the scale factors
-            of the joint values.
-        noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
-            an axis (rad). None: the noise is estimated from the residuals.
+        fit: Names of the sets of parameters to fit. "base": the pose of the base in the instrument's frame.
+            "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
+            six numbers of each joint origin, or all cells of a table. "gains": the scale factors of the joint
+            values.
+        noise: Standard deviations of a position coordinate (m) and of a rotation about an axis (rad). None:
+            the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
-        full_poses: True if you will measure full poses; False if you will measure only positions. If `poses`
-            is given, this argument has no effect.
-        radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
-        force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
-            If joint values look like degrees, `force` has no effect: convert the values, or pass
-            `radians=True` for values in radians.
-        write_all: Whether to write all fitted parameters, including parameters that changed by less than two
-            standard deviations.
+        full_poses: Whether you will measure full poses, not only positions. Without effect if `poses` is
+            given.
+        radians: Whether joint angles of more than one turn are radians, not degrees.
+        force: Whether to return a fit that is not plausible. Without effect if joint values look like
+            degrees. Convert such values, or pass `radians=True` for values in radians.
+        write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
         InputError: an array has a wrong shape, there are too few poses, or the positions are not in metres.
@@ -300,10 +307,9 @@ def fit_model(
     write_all: bool = True,
     check: bool = True,
 ) -> Calibration:
-    """Return the calibration of a model, even if the fit is not plausible.
+    """Calibrate a model, plausible or not.
 
-    `calibrate` describes the arguments. If `check` is false, this function does not check whether the fit is
-    plausible.
+    `calibrate` describes the arguments.
     """
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
@@ -343,9 +349,9 @@ def fit_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return the parameters (p,) of the original model.
+    """Return the original parameters.
 
-    If the tool is fitted, `_TARGET_DIVISORS` defines the position of the target.
+    If the tool is fitted, `_TARGET_DIVISORS` defines the target's position.
     """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
@@ -361,7 +367,11 @@ def _joint_values(model: CalibrationModel, robot: Robot, q: FloatArray) -> Float
 def _check_measured(
     robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measurements]:
-    """Check the arguments; return the path's coordinates (samples, n) and the measured poses."""
+    """Check the measured data.
+
+    Returns:
+        (samples, n) coordinates, and poses.
+    """
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.parse(q, "q")
@@ -452,11 +462,9 @@ def _add_identifiable(
     stated: Noise | None,
     full_fit: Fit,
 ) -> tuple[Identification, Fit]:
-    """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
+    """Add parameters that reduce the residuals.
 
-    Fewer parameters are identifiable in special geometries, and the original model often has such a geometry.
-    For example, if the tip lies on the last joint's axis, the tip's position does not depend on the last
-    joint's angle.
+    The original geometry is often special, with fewer identifiable parameters.
     """
     again = identify(
         model,
@@ -514,9 +522,7 @@ def _find_poorly_observable(
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio.
 
-    For a URDF, the poses are compared at the measured configurations. For a table, the poses are compared at
-    q = 0. A URDF cannot contain base, tool or gains. Therefore, these parameters are 0 in the comparison of a
-    URDF.
+    A URDF cannot contain base, tool or gains.
     """
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:
@@ -621,10 +627,13 @@ def read_poses(
     units: Mapping[str, str] | None = None,
     default_q: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
+    """Read configurations and poses.
 
-    `required_coordinates` names the coordinates that a CSV file must contain. `default_q` (nq,)
-    contains the values of coordinates without a column.
+    A CSV file must contain `required_coordinates`. `default_q` (nq,) contains the values of
+    coordinates without a column.
+
+    Returns:
+        Configurations (s, nq), and poses (s, 4, 4) or positions (s, 3), m.
     """
     if path.suffix.lower() == ".npz":
         q, T = _archive(path, len(coordinates))
@@ -704,7 +713,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 
 
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
-    """Replace each measured rotation by the nearest rotation matrix, because the input may be rounded."""
+    """Remove rounding errors from rotation matrices."""
     R = T[:, :3, :3]
     wrong = rotation_defect(R) > _ROTATION_TOLERANCE
     if wrong.any():
@@ -719,7 +728,11 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
 
 
 def as_pose_array(poses: ArrayLike) -> FloatArray:
-    """Return poses (s, 4, 4) or positions (s, 3) as an array."""
+    """Check poses or positions.
+
+    Returns:
+        (s, 4, 4) poses or (s, 3) positions.
+    """
     array = as_finite(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array

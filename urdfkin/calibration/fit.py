@@ -2,56 +2,70 @@
 
 **Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound, which takes
+parameters. `urdfkin.verify.singular_values` computes a lower bound for each singular value, which takes
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
 lower bound, so no tolerance is needed.
 
-The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. An opposite
-change of the next frame then leaves the tip's pose unchanged. The frame of a prismatic joint can be shifted
-anywhere and rotated about the joint's direction. Therefore, 4 of the 6 parameters of a revolute joint are
-identifiable, and 2 of the 6 parameters of a prismatic joint. All 6 parameters of the tip are identifiable
-(Everett, Driels and Mooring, 1987). If only positions are measured, 3 fewer parameters are identifiable,
-because the tool's orientation is unknown.
+Some changes of a joint's frame can be compensated by an opposite change of the next frame (Everett, Driels
+and Mooring, 1987):
 
-Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
-has a column in the Jacobian. The remainder of a column is the column minus its projection onto the columns
-that are already chosen. The longer the remainder, the more independent the column is of the chosen columns. A
-column is a candidate if its remainder is at least half as long as the longest remainder. Each step chooses
-the candidate that comes first in the model's order of preference. The parameter of the chosen column is
-fitted. Columns with shorter remainders are excluded, because fitted parameters with nearly dependent columns
-can become very large. For example, four fitted lengths along nearly parallel axes could be hundreds of
-metres, and cancel each other.
+| Joint | Compensated changes | Identifiable parameters |
+|---|---|---|
+| revolute | shift along the axis, rotation about the axis | 4 of 6 |
+| prismatic | any shift, rotation about the joint's direction | 2 of 6 |
+| tip | none | 6 of 6 |
+| tip, only positions measured | orientation of the tool | 3 of 6 |
+
+Orthogonal elimination chooses the fitted parameters, joint by joint, from base to tip. Each parameter has a
+column in the Jacobian.
+
+    remainder of a column: the column minus its projection onto the chosen columns
+    length of the remainder: independence from the chosen columns
+    candidate: a column whose remainder is at least half as long as the longest remainder
+    next chosen column: the first candidate in the model's order of preference
+
+Columns with shorter remainders are excluded, because fitted parameters with nearly dependent columns can
+become very large. For example, four fitted lengths along nearly parallel axes could be hundreds of metres,
+and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
-Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
-and r the weighted residuals. The covariance of the parameters is
+Each error is divided by the standard deviation of its noise. At the minimum:
 
-    C = (J^T J)^-1.
+    J, r                weighted Jacobian, weighted residuals
+    C = (J^T J)^-1      covariance of the parameters
+    H = J C J^T         hat matrix
+    1 - H_ii            redundancy of measurement i
 
-The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
+If you do not state the noise, it is estimated from the residuals. The estimation is repeated until the
+estimates are constant (Foerstner's variance components).
 
-If you do not state the noise, it is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is the sum of the squared position residuals, divided by the sum of their
-redundancies 1 - H_ii. The variance of the rotations is computed in the same way. The
-estimation is repeated until the estimates are constant (Foerstner's variance components).
+    variance of the positions = sum of their squared residuals / sum of their redundancies
+    variance of the rotations = sum of their squared residuals / sum of their redundancies
 
-A pose is an **outlier** if the statistic r_i^T (1 - H_ii)^-1 r_i is too large. If a pose is not an outlier,
-its statistic has a chi^2 distribution. The distribution has 3 degrees of freedom for a position, and 6 for a
-full pose. In a data set without outliers, the probability that any statistic exceeds the limit is about 1 %.
+A pose is an **outlier** if its statistic is too large:
+
+    statistic                 r_i^T (1 - H_ii)^-1 r_i
+    without outliers          chi^2 distribution
+    degrees of freedom        3 for a position, 6 for a full pose
+    limit                     without outliers, any statistic exceeds it with a probability of about 1 %
+
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
 The steps end when no outlier is left.
 
-**Start values.** Before the fit, start values of base and tool are computed from the measured poses. The
-robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i
-and R_X be the rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown
-rotations R_B and R_X. The null vector of these equations contains the entries of R_B and R_X (Shah, 2013).
-Let p_i be the positions in the robot's poses T_i. Let x be the unknown translation of the tool, and b the
-unknown translation of the base. The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in x and b.
+**Start values.** Before the fit, start values of base and tool are computed from the measured poses.
 
-If only positions are measured, the base and the position of the target on the tip are unknown. If the
-target's position is known, the base's rotation can be computed directly. If the base's rotation is known, the
-equations for the positions of base and target are linear. The module therefore computes the rotation and the
-two positions alternately.
+    T_i, R_i, p_i       robot's poses, with rotations and positions
+    M_i, R_Mi, p_Mi     measured poses
+    B, R_B, b           base
+    X, R_X, x           tool
+
+    M_i = B T_i X
+    R_B^T R_Mi = R_i R_X              linear in R_B and R_X, whose entries form the null vector (Shah, 2013)
+    p_Mi = R_B (R_i x + p_i) + b      linear in x and b
+
+If only positions are measured, base and target on the tip are unknown. A known target position determines the
+base's rotation directly. A known rotation of the base makes the equations for both positions linear. The
+module therefore computes the rotation and the two positions alternately.
 """
 
 from __future__ import annotations
@@ -85,13 +99,12 @@ _EFFECT_FRACTION = 1e-6
 
 @dataclass(frozen=True)
 class Identification:
-    """The parameters that can be fitted to the measurements, and the parameters that stay fixed.
+    """The parameters that can be fitted, and the parameters that stay fixed.
 
     Attributes:
         free_parameters: Indices of the fitted parameters, which have linearly independent effects.
         fixed_parameters: Indices of the fixed parameters, each with the reason.
-        measured_numbers: Number of all measured coordinates; a position has 3 coordinates, and a full pose
-            has 6.
+        measured_numbers: Number of measured coordinates: 3 of each position, or 6 of each full pose.
     """
 
     free_parameters: tuple[int, ...]
@@ -110,9 +123,12 @@ def stack_jacobian(
     full_poses: bool,
     parameter_values: FloatArray | None = None,
 ) -> FloatArray:
-    """Return the dimensionless Jacobian (rows, p) of all measurements.
+    """Return the dimensionless Jacobian.
 
     Angles are multiplied by `chain.characteristic_length`.
+
+    Returns:
+        (rows, p) Jacobian of all measurements.
     """
     L = model.chain.characteristic_length
     _, columns = model.chain.poses_and_jacobian(joint_values, parameter_values)
@@ -129,9 +145,13 @@ def identify(
     full_poses: bool = True,
     parameter_values: FloatArray | None = None,
 ) -> Identification:
-    """Determine which parameters are identifiable at joint values (s, n) and parameter values (p,).
+    """Determine the identifiable parameters.
 
-    `full_poses` is True if full poses are measured, and False if only positions are measured.
+    Args:
+        model: The model.
+        joint_values: (s, n) joint values.
+        full_poses: Whether full poses are measured.
+        parameter_values: (p,) parameter values.
     """
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
@@ -213,9 +233,9 @@ class Measurements:
     """Measured poses or positions.
 
     Attributes:
-        joint_values: (s, n) joint values of the path, rad or m.
+        joint_values: (s, n) values, rad or m.
         p: (s, 3) positions in the base, m.
-        R: (s, 3, 3) orientations in the base; None if only positions were measured.
+        R: (s, 3, 3) orientations; None for positions only.
     """
 
     joint_values: FloatArray
@@ -235,13 +255,18 @@ class Measurements:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of each position coordinate (m), and of the rotation about each axis (rad)."""
+    """Standard deviations of the measurements.
+
+    Attributes:
+        metres: For each position coordinate, m.
+        radians: For the rotation about each axis, rad.
+    """
 
     metres: float
     radians: float
 
     def deviations(self, full_poses: bool) -> FloatArray:
-        """Return the standard deviations (6,) of a full pose, or (3,) of a position."""
+        """Return (6,) deviations of a pose, or (3,) of a position."""
         return np.array([self.metres] * 3 + ([self.radians] * 3 if full_poses else []))
 
 
@@ -251,10 +276,10 @@ class Fit:
 
     Attributes:
         parameter_values: (p,) values of all parameters.
-        residuals: (s, 6) or (s, 3) residuals: measured minus computed, in the base, m and rad.
+        residuals: (s, 6) or (s, 3) measured minus computed values, in the base, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. The covariance
-            is infinite if the redundancy is 0.
+        covariance: (k, k) covariance of the fitted parameters, in their units; infinite if the redundancy is
+            0.
         redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         chi_squares: (s,) chi^2 statistic of each pose.
     """
@@ -268,7 +293,7 @@ class Fit:
 
     @property
     def total_redundancy(self) -> float:
-        """The total redundancy: the number of measured coordinates minus the number of fitted parameters."""
+        """The number of measured coordinates minus the number of fitted parameters."""
         return float(self.redundancies.sum())
 
     @property
@@ -277,7 +302,7 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct."""
+        """The ratio of the noise in the residuals to the stated noise."""
         if not self.has_redundancy:
             return math.nan
         whitened = self.residuals / self.noise.deviations(self.residuals.shape[1] == 6)
@@ -289,7 +314,7 @@ class Fit:
         return 1.0 / math.sqrt(2.0 * max(self.total_redundancy, _MIN_REDUNDANCY))
 
     def rms(self) -> tuple[float, float | None]:
-        """Return the root mean square of the position errors (m) and of the orientation errors (rad)."""
+        """Return the rms errors of position (m) and orientation (rad)."""
         position, rotation = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.residuals, [3]))
         return float(position), float(rotation) if self.residuals.shape[1] == 6 else None
 
@@ -302,7 +327,11 @@ class Fit:
 def compute_residuals(
     model: CalibrationModel, measurements: Measurements, parameter_values: FloatArray
 ) -> FloatArray:
-    """Return the residuals (s, 3) of positions or (s, 6) of poses, in m and rad, along the base's axes."""
+    """Return residuals along the base's axes.
+
+    Returns:
+        (s, 3) for positions, or (s, 6) for poses, m and rad.
+    """
     return _residuals_of_poses(measurements, model.chain.poses(measurements.joint_values, parameter_values))
 
 
@@ -320,7 +349,7 @@ def fit_parameters(
     noise: Noise | None,
     parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the parameters with the indices `free_parameters`, by least squares.
+    """Fit the free parameters.
 
     The start values are `parameter_values` (p,).
     """
@@ -351,7 +380,7 @@ def fit_parameters(
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
     """Estimate the noise from the residuals.
 
-    An estimate of 0 would cause a division by 0, so the estimate is at least the rounding error.
+    A lower limit avoids division by 0.
     """
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
@@ -368,8 +397,6 @@ def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurement
 
 @dataclass(frozen=True, eq=False)
 class _LeastSquares:
-    """The least-squares problem for the free parameters; the residuals are divided by the noise."""
-
     model: CalibrationModel
     measurements: Measurements
     free_parameters: list[int]
@@ -446,12 +473,10 @@ def reject_outliers(
 def select_significant(
     changes: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 ) -> NDArray[np.bool_]:
-    """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
+    """Select significant changes by backward elimination.
 
-    Each step resets the least significant parameter to its old value. The covariance determines how the reset
-    of one parameter changes the other parameters. The measurements may determine only a combination of two
-    parameters. The reset of one of these two parameters can make the other parameter significant. A `fixed`
-    parameter is always selected. Unknown entries of the covariance are inf.
+    Each step resets one parameter. The reset can make a correlated parameter significant. `fixed` parameters
+    are always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -476,7 +501,7 @@ def select_significant(
 
 
 def chi2_quantile(probability: float, degrees_of_freedom: int) -> float:
-    """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931).
+    """Return the chi^2 quantile (Wilson and Hilferty, 1931).
 
     The relative error is at most a few per cent.
     """
@@ -495,7 +520,11 @@ _LARGEST_SPREAD = 100.0
 
 
 def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
-    """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
+    """Return start values for a fit.
+
+    Returns:
+        (p,) values.
+    """
     parameter_values = model.chain.initial_values.copy()
     ends = {parameter.element for parameter in model.chain.parameters if parameter.is_base_or_tool}
     if not ends:
@@ -544,7 +573,10 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
 
 
 def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Solve R_B^T M_i = R_i R_X for R_B and R_X, written as M_i^T R_B - R_X^T R_i^T = 0."""
+    """Solve R_B^T M_i = R_i R_X for R_B and R_X.
+
+    The linear form is M_i^T R_B - R_X^T R_i^T = 0.
+    """
     unit = np.eye(3)
     left = np.einsum("sab,cd->sacbd", M.swapaxes(-1, -2), unit).reshape(-1, 9)
     right = np.einsum("ab,scd->sacbd", unit, R).reshape(-1, 9)
@@ -564,7 +596,7 @@ def _nearest_rotation(M: FloatArray) -> FloatArray:
 def _translations(
     T: FloatArray, p: FloatArray, R_B: FloatArray, base: bool, tool: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve p_Mi = R_B R_i x + R_B p_i + b for the vectors b and x."""
+    """Solve p_Mi = R_B R_i x + R_B p_i + b for b and x."""
     rest = (p - T[:, :3, 3] @ R_B.T).ravel()
     columns = [np.tile(np.eye(3), (len(p), 1))] if base else []
     columns += [(R_B @ T[:, :3, :3]).reshape(-1, 3)] if tool else []
@@ -573,11 +605,7 @@ def _translations(
 
 
 def check_metres(model: CalibrationModel, measurements: Measurements) -> None:
-    """Raise InputError if the measured positions are much farther apart than the positions of the tip.
-
-    The spread of positions is the largest distance (m) of a position from the mean position. The spread of
-    the measured positions must be at most 100 times the spread of the tip's positions in the original model.
-    """
+    """Check that positions are in metres."""
     T = model.chain.poses(measurements.joint_values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measurements.p)

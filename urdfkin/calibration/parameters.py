@@ -3,17 +3,26 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint
 origin of a URDF and a row of a Denavit-Hartenberg table are such products. An elementary motion is a rotation
 by an angle or a translation by a length. A parameter or the value of a joint determines the angle or length.
-A joint can have a gain g. A joint with the value q then moves by the angle or length (1 + g) q. Let D be the
-derivative of the tip's pose by this angle or length. The derivative of the tip's pose by g is then q D.
+A joint can have a gain g:
+
+    q              value of the joint
+    (1 + g) q      angle or length of the joint's motion
+    D              derivative of the tip's pose by this angle or length
+    q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip also has six parameters. Let T be the joint's original origin, and let A be the
-rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry)
-Rz(rz) . A^-1. Therefore, the parameter z always shifts the origin along the joint's axis. A change of rz
-changes the zero position of a revolute joint. The other four parameters move the axis. The gain is a seventh
-parameter. A URDF cannot store a gain. `base` and `tool` have six parameters each. The path begins with the
-motions of `base`: the pose of the robot's base in the instrument's frame. The path ends with the motions of
-`tool`: the pose of the target in the tip's frame.
+directly before the tip also has six parameters. Other fixed joints have no parameters, because moving joints
+have parameters with the same effect.
+
+    T                                                            original origin of the joint
+    A                                                            rotation from the z axis to the joint's axis
+    T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1        new origin
+
+The parameter z shifts the origin along the joint's axis. A change of rz changes the zero position of a
+revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
+store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
+robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
+the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL_TOLERANCE`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
@@ -46,9 +55,8 @@ class Parameter:
 
     Attributes:
         element: "base", "tool", or the name of a joint.
-        name: Parameter of an origin ("x", "rx", ...), "gain", or a cell of a table ("theta", "d", ...).
+        name: "x", "rx", ..., "gain", or a cell of a table ("theta", "d", ...).
         unit: "m", "rad", or "" for a gain.
-        is_base_or_tool: True for a parameter of the base or the tool; False for a parameter of a joint.
     """
 
     element: str
@@ -62,15 +70,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ParametricMotion(ElementaryMotion):
-    """A rotation or translation by an angle or length that a parameter or a joint's value determines.
+    """A motion by a parameter or a joint value.
 
     Attributes:
-        parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
-            joint's gain, or None if the joint has no gain.
-        joint: Index of the joint whose value is the angle or length; None if the angle or length is a
-            parameter.
-        sense: Sign of the angle or length: -1 if the path leads from the joint's child to the joint's parent,
-            or if the table's row subtracts the joint's value. Otherwise 1.
+        parameter: Index of the parameter or gain; None without a gain.
+        joint: Index of the joint, if any.
+        sense: -1 for a reversed motion, else 1.
     """
 
     parameter: int | None
@@ -80,9 +85,12 @@ class ParametricMotion(ElementaryMotion):
 
 @dataclass(frozen=True, eq=False)
 class ParametricChain:
-    """The pose of a tip as a function of parameters and joint values.
+    """A path with parameters.
 
-    Each parameter occurs once in the path. `initial_values` (p,) contains the values in the original model.
+    Each parameter occurs once in the path.
+
+    Attributes:
+        initial_values: (p,) values in the original model.
     """
 
     path: Path
@@ -95,10 +103,7 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Sum (m) of the model's lengths, or 1 if the sum is 0.
-
-        The product of an angle in radians and this length is a distance in metres.
-        """
+        """Sum (m) of the model's lengths, or 1 if the sum is 0."""
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -108,7 +113,11 @@ class ParametricChain:
         return sum(constant) + float(sum(fitted)) or 1.0
 
     def poses(self, joint_values: FloatArray, parameter_values: FloatArray | None = None) -> FloatArray:
-        """Return poses (s, 4, 4) of the tip in the base for joint values (s, n)."""
+        """Return the tip's poses.
+
+        Returns:
+            (s, 4, 4) poses in the base.
+        """
         return self.path.poses(
             self._displacements(
                 joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -116,7 +125,11 @@ class ParametricChain:
         )
 
     def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
-        """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
+        """Return the poses after each transform.
+
+        Returns:
+            (s, steps, 4, 4) poses; the last pose is the tip's.
+        """
         return self.path.frames(self._displacements(joint_values, parameter_values)[0])
 
     def poses_and_jacobian(
@@ -125,10 +138,12 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
+        """Return tip poses and their Jacobian.
 
-        `frames` (s, steps, 4, 4) contains the poses that the method `frames` returns for these joint values
-        and parameters. If `frames` is None, the function computes these poses.
+        `frames` can contain the result of the method `frames`.
+
+        Returns:
+            (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
         """
         amounts, factors = self._displacements(
             joint_values, self.initial_values if parameter_values is None else parameter_values
@@ -145,7 +160,11 @@ class ParametricChain:
     def _displacements(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the angle or length (s, motions) of each motion, and the derivatives by the parameters."""
+        """Return the displacements of the motions.
+
+        Returns:
+            (s, motions) displacements, and their derivatives by the parameters.
+        """
         factors = np.empty((len(joint_values), len(self._parametric_motions)))
         numbers = np.ones(len(self._parametric_motions))
         for k, motion in enumerate(self._parametric_motions):
@@ -155,9 +174,10 @@ class ParametricChain:
         return factors * numbers, factors
 
     def rounding_bound(self, joint_values: FloatArray) -> float:
-        """Bound the rounding error (m) of each number that `poses_and_jacobian` returns.
+        """Bound the rounding error of `poses_and_jacobian`.
 
-        For numbers in radians, divide the returned bound by `characteristic_length`.
+        Returns:
+            Bound, m; divide by `characteristic_length` for radians.
         """
         slides = [
             motion.joint
@@ -200,9 +220,10 @@ _CELL_PREFERENCES = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class CalibrationModel:
-    """A parametric chain whose parameters are grouped by joint, base and tool.
+    """A parametric chain with grouped parameters.
 
-    Each group contains parameter indices in order of preference.
+    Attributes:
+        groups: Parameter indices in order of preference.
     """
 
     chain: ParametricChain
@@ -213,10 +234,6 @@ class CalibrationModel:
     source: KinematicTree | DHTable
 
     def base_or_tool_pose(self, element: str, parameter_values: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of `element` ("base" or "tool"); None if this element is not fitted.
-
-        `parameter_values` (p,) contains the values of all parameters.
-        """
         if not any(
             parameter.is_base_or_tool and parameter.element == element for parameter in self.chain.parameters
         ):
@@ -224,9 +241,12 @@ class CalibrationModel:
         return self._change(element, parameter_values, is_base_or_tool=True)
 
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origin (4, 4) of each URDF joint whose origin moved, by joint name.
+        """Return the changed joint origins.
 
-        The origin of a locked joint does not include the value at which the joint is locked.
+        The origin of a locked joint excludes the locked value.
+
+        Returns:
+            (4, 4) origins by joint name.
         """
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
@@ -263,7 +283,7 @@ class CalibrationModel:
     def _change(
         self, element: str, parameter_values: FloatArray, *, is_base_or_tool: bool = False
     ) -> FloatArray:
-        """Return the (4, 4) motion that is given by the six parameters of a joint, the base or the tool."""
+        """Return the motion of an element."""
         parameters = enumerate(self.chain.parameters)
         values = {
             p.name: float(parameter_values[k])
@@ -346,11 +366,6 @@ class _ModelBuilder:
 
 
 def make_urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
-    """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
-
-    A fixed joint directly before the tip also has parameters. Other fixed joints have no parameters, because
-    the neighbouring moving joints have parameters with the same effect.
-    """
     path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
     builder.add_base_or_tool("base")
@@ -390,7 +405,6 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> 
 
 
 def make_table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
-    """Make a parametric model of a table; `fit` names the sets of parameters."""
     builder = _ModelBuilder(fit)
     builder.add_base_or_tool("base")
     builder.steps.append(table.base)

@@ -83,8 +83,10 @@ _join_names = partial(join_names, limit=4)
 class Plausibility:
     """The reasons why a fit is refused.
 
-    `objections` contains the reasons. `reason` names the likeliest mistake and its remedy; None if no mistake
-    is found. If `is_in_degrees` is True, `calibrate` refuses the fit even with `force`.
+    Attributes:
+        objections: The reasons; empty for a plausible fit.
+        reason: The likeliest mistake and its remedy, if found.
+        is_in_degrees: Whether `calibrate` refuses the fit even with `force`.
     """
 
     objections: tuple[str, ...] = ()
@@ -96,7 +98,9 @@ class Plausibility:
 class FitWithData:
     """A fit with its data.
 
-    `q` (s, c) contains the coordinates of the path. `base_tool_fit` fits only base and tool.
+    Attributes:
+        q: (s, c) coordinates of the path.
+        base_tool_fit: Fit of base and tool alone.
     """
 
     model: CalibrationModel
@@ -108,10 +112,9 @@ class FitWithData:
 
     @cached_property
     def reach(self) -> float:
-        """The reach (m) of the original model at the measured configurations.
+        """Reach of the original model, m.
 
-        The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
-        The reach is at most the sum of the model's lengths.
+        The reach is the tip's largest distance from the base or a joint axis.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -121,11 +124,13 @@ class FitWithData:
         return min(chain.characteristic_length, float(max(levers, distance))) or chain.characteristic_length
 
     def residual_deviation(self, reach: float) -> float:
-        """Return the standard deviation (m) of the residuals; angles are multiplied by the reach."""
+        """Return the residuals' standard deviation, m.
+
+        Angles are multiplied by the reach.
+        """
         return _norm(self.full_fit.residuals, reach) / math.sqrt(max(self.full_fit.total_redundancy, 1.0))
 
     def redundancy_objections(self) -> list[str]:
-        """Return a message if the measured values have no redundancy, else an empty list."""
         steps = np.round(self.measurements.joint_values / _ONE_CONFIGURATION)
         distinct, each = len(np.unique(steps, axis=0)), self.full_fit.residuals.shape[1]
         rank = self.identification.rank
@@ -166,9 +171,9 @@ class FitWithData:
             yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
     def half_turn_zeros(self) -> list[str]:
-        """Return the name and the change of each joint whose zero position changed by about half a turn.
+        """Return joints whose zero changed by half a turn.
 
-        Such a change can be the result of a wrong sign: the measured values of the next joint are negated.
+        A wrong sign of the next joint can cause such a change.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -179,7 +184,11 @@ class FitWithData:
         ]
 
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield each fitted parameter of a moving joint, its change, and a lower bound of |change|."""
+        """Yield changes of moving joints' parameters.
+
+        Yields:
+            Parameter, change, lower bound of |change|.
+        """
         model, fitted = self.model, self.full_fit
         near = set[str]()
         if not self.measurements.full_poses:
@@ -201,7 +210,6 @@ class FitWithData:
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
-    """Check whether a fit is plausible; for an implausible fit, find the likeliest mistake in the data."""
     few = fit.redundancy_objections()
     misfits = [*fit.misfit_objections(), *fit.extreme_parameter_objections()]
     like_degrees, outside = _out_of_range(fit.model, fit.q)
@@ -246,7 +254,11 @@ def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], li
 
 
 def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, float]]:
-    """Yield (name, is_angle, lower limit, upper limit) for each coordinate of the path."""
+    """Yield the path's coordinates.
+
+    Yields:
+        (name, is_angle, lower limit, upper limit).
+    """
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
         lower, upper, kind = -math.inf, math.inf, kinds.get(name)
@@ -263,9 +275,10 @@ def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, fl
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """The configurations `q` after the correction of one possible mistake.
+    """Configurations after correcting one mistake.
 
-    The first row of `q` belongs to the pose with the index `first`. The next rows belong to the next poses.
+    Attributes:
+        first: Index of the first row's pose.
     """
 
     reason: str
@@ -322,9 +335,9 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
-    """Reverse the signs of joints one by one while the error decreases.
+    """Reverse signs one by one while the error decreases.
 
-    Return None if fewer than two signs are reversed.
+    None: fewer than two signs are reversed.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
@@ -382,5 +395,8 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm (m) of residuals (s, 6) or (s, 3); angles are multiplied by the reach."""
+    """Return the norm of residuals, m.
+
+    Angles are multiplied by the reach.
+    """
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))

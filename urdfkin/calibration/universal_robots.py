@@ -6,12 +6,16 @@ hundreds of metres. The parameters d of the next rows then cancel this offset. T
 `ur_calibration` shifts the link frames along their axes, so that these large offsets disappear. The program
 writes the pose of each joint in the frame of the previous joint: x, y, z, roll, pitch and yaw.
 
-The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
-(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
-Rz(yaw) Ry(pitch) Rx(roll). Let one angle be a quarter turn, let the second angle be small (1e-5 to 1e-4 rad),
-and let the third angle be 0. The two products then differ by about 1.4 times the small angle. With the order
-"driver", the result agrees with the robot's controller. With the order "urdf", the result agrees with the
-URDF that the ROS package generates from the file.
+The order of the rotations is ambiguous:
+
+    driver               R = Rx(roll) Ry(pitch) Rz(yaw)      Eigen's `eulerAngles(0, 1, 2)`
+    ROS description      R = Rz(yaw) Ry(pitch) Rx(roll)      angles copied into a URDF
+
+    angles: a quarter turn, a small angle (1e-5 to 1e-4 rad), and 0
+    difference of the two products: about 1.4 times the small angle
+
+With the order "driver", the result agrees with the robot's controller. With the order "urdf", the result
+agrees with the URDF that the ROS package generates from the file.
 """
 
 from __future__ import annotations
@@ -62,7 +66,13 @@ _DISTANCE_SAMPLES = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the origin (4, 4) of each joint from the driver's YAML, or from a `default_kinematics.yaml`."""
+    """Read joint origins from YAML.
+
+    The file is the driver's, or a `default_kinematics.yaml`.
+
+    Returns:
+        (4, 4) origins by joint name.
+    """
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
     try:
@@ -108,11 +118,9 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 
 
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
-    """Apply a calibration file to the URDF of a Universal Robots arm.
+    """Apply a calibration file to a URDF.
 
-    In the current ROS description, all six joints turn about z. For such a URDF, the origins in the
-    calibration file replace the joint origins. For other URDFs, such as the older ROS description, urdfkin
-    fits the joint origins. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
+    If all joints turn about z, the origins are copied. For other URDFs, the joint origins are fitted.
     """
     robot = as_robot(robot)
     origins = read_calibration(path, order)
@@ -170,7 +178,7 @@ def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare poses of the new URDF with poses of the calibration file; Pinocchio checks the new URDF."""
+    """Compare the URDF with the calibration."""
     written = result.new_robot
     q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
@@ -187,9 +195,12 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms.
+    """Return the largest sampled displacement between two arms.
 
-    The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
+    The returned angle is 2 sin(angle / 2), which is accurate only for small angles.
+
+    Returns:
+        Distance, m, and angle, rad.
     """
     paths = [make_chain(make_calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _DISTANCE_SAMPLES)

@@ -31,11 +31,13 @@ _ROUNDING = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
-    """Write new joint origins into a URDF, and return the new bytes.
+    """Write new joint origins into a URDF.
 
-    `data` contains the original URDF. `origins` contains the new origin (4, 4) of each changed joint, by
-    joint name. A number that is unchanged up to rounding keeps its digits. A rotation has several triples of
-    roll, pitch and yaw angles; the triple nearest to the old angles is written.
+    A number that is unchanged up to rounding keeps its digits.
+
+    Args:
+        data: The original URDF.
+        origins: (4, 4) origins by joint name.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -67,7 +69,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Return three numbers as text; a number that differs from `old` only by rounding keeps its digits."""
+    """Return three numbers as text."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
@@ -79,7 +81,7 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
 
 
 def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
-    """Return the roll, pitch and yaw (3,) of a rotation that are nearest to the angles `old`.
+    """Return the roll, pitch and yaw nearest to `old`.
 
     >>> from urdfkin.kinematics.rotation import rotation_from_rpy
     >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
@@ -104,7 +106,7 @@ class UpdatedURDF:
     Attributes:
         robot: The robot before the change.
         origins: The new origin (4, 4) of each changed joint, by joint name.
-        certificate: The result of checking the new URDF with Pinocchio; None if it was not checked.
+        certificate: Result of Pinocchio's check; None if not checked.
     """
 
     robot: Robot
@@ -129,7 +131,7 @@ class UpdatedURDF:
 
     @cached_property
     def displacements(self) -> dict[str, tuple[float, float]]:
-        """The translation (m) and the rotation (rad) of each joint's origin."""
+        """Translation (m) and rotation (rad) of each joint's origin."""
         tree = self.robot.tree
         old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {

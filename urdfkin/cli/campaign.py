@@ -43,7 +43,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # urdfkin may compile kernels before the first new result.
+        # Time before the first new result is not counted: urdfkin may compile kernels.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:

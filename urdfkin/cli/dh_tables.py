@@ -264,7 +264,7 @@ def _better_interpretation(
     metres = found.metres
     if not found.is_fitted:
         # `find_better_interpretation` needs the tip error after a fit.
-        # With --no-fit, `found.metres` is the tip error itself.
+        # With --no-fit, `found.metres` is the tip error without a fit.
         metres, radians = fast_fit_errors(chain, reference, found.tolerance)
         if max(metres, radians * found.reach) <= found.tolerance:
             return None

@@ -79,7 +79,7 @@ def run(command: click.Command, name: str) -> int:
     defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
-        # In standalone mode, click would return 1 after an interrupt.
+        # In standalone mode, click would exit with 1 after an interrupt.
         try:
             code = command.main(prog_name=name, standalone_mode=False)
         finally:

@@ -238,7 +238,7 @@ def _metadata(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.has_columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.velocity_names]
-        # In CSV, each line is one entry of the Jacobian.
+        # In a Hessian's CSV, each line has the derivatives of one Jacobian entry.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]

@@ -1,20 +1,24 @@
 """Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
 **Search.** The search starts at the random configurations with the largest distances, and varies one
-coordinate at a time. The largest distance found by the search is a lower bound.
+coordinate at a time. The largest distance found is a lower bound.
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
-differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. The
-function divides the space of all variables into boxes. Let D(q) = p_B - p_A be the difference of the frame's
-positions in B and A. Let c be the middle of a box. In this box, variable i ranges from c_i - h_i to c_i +
-h_i. At a configuration q in the box, variable i has the value c_i + x_i. Then
+differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound: it
+divides the space of all variables into boxes, and bounds the distance in each box.
 
-    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
+    D(q) = p_B - p_A              difference of the frame's positions in B and A
+    D_i                           derivative of D with respect to variable i
+    c                             middle of the box
+    c_i - h_i to c_i + h_i        range of variable i in the box
+    c_i + x_i,  |x_i| <= h_i      value of variable i at a configuration q in the box
+    M_ij                          bound on the second derivative of D with respect to variables i and j,
+                                  for every configuration (`curvature`)
 
-Here D_i is the derivative of D with respect to variable i. For every configuration, M_ij bounds the second
-derivative of D with respect to variables i and j (`urdfkin.model.mechanisms.upper_bound.curvature`). If the
-bound of a box is at most the target, the box is finished. Otherwise, the box is halved.
+    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
+
+If the bound of a box is at most the target, the box is finished. Otherwise, the box is halved.
 """
 
 from __future__ import annotations
@@ -58,11 +62,10 @@ PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
 class DistanceSearch:
-    """Search for the configurations at which two aligned robots differ most.
+    """Search for the largest frame distances.
 
-    The search for matching joints starts at the base link of A and at the base link of B. If `as_written` is
-    False, the pose of B's base link in the frame of A's base link is constant. If `as_written` is True, the
-    pose of B's root in A's root frame is constant.
+    Args:
+        as_written: Whether poses are relative to the root links.
     """
 
     def __init__(
@@ -101,10 +104,14 @@ class DistanceSearch:
     def configurations(
         self, z: FloatArray, *, random_free_joints: bool = False
     ) -> tuple[FloatArray, FloatArray]:
-        """Return configurations (n, nq) of A and B for values `z` (n, variables).
+        """Return configurations of A and B.
 
-        If `random_free_joints` is true, the configuration of A's planar and floating joints is random.
-        Otherwise, it is the neutral configuration.
+        Args:
+            z: (n, variables) values.
+            random_free_joints: Whether A's planar and floating joints are random.
+
+        Returns:
+            (n, nq) configurations of both robots.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
@@ -127,7 +134,12 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether `q_a` and `q_b` (1, nq) correspond and are within the joint ranges."""
+        """Check correspondence and joint ranges.
+
+        Args:
+            q_a: (1, nq) configuration of A.
+            q_b: (1, nq) configuration of B.
+        """
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -149,7 +161,11 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], compute_poses: PoseFunction
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (n, frames, 4, 4) of A and of B in A's root frame at configurations."""
+        """Return poses in A's root frame.
+
+        Returns:
+            (n, frames, 4, 4) poses of both robots.
+        """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.alignment.base[1]]
@@ -175,13 +191,18 @@ class DistanceSearch:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames), m, at values `z` (n, variables)."""
+        """Return the frame distances.
+
+        Returns:
+            (n, frames) distances, m.
+        """
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sample_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Sample n values (n, variables) of the variables, and compute the distances (n, frames), m.
+        """Return distances at sampled values.
 
-        Return the distances and the sampled values.
+        Returns:
+            (n, frames) distances, m, and (n, variables) values.
         """
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
@@ -204,9 +225,11 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize each frame's distance by coordinate search.
+        """Maximize distances by coordinate search.
 
-        `z` (frames, starting points, variables) contains the starting points of the search.
+        Args:
+            frames: Matching frames.
+            z: (frames, starting points, variables) values.
         """
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
@@ -236,10 +259,14 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (m) between each frame of A and the matching frame of B.
+        """Return each frame's distances at its own configurations.
 
-        `z` contains different configurations for each frame. Its shape is (frames, starting points, values,
-        variables). The result has the shape (frames, starting points, values).
+        Args:
+            z: (frames, starting points, values, variables).
+            frames: Matching frames.
+
+        Returns:
+            (frames, starting points, values) distances, m.
         """
         # NumPy rejects the size -1 for an empty array.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -284,9 +311,10 @@ BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Upper bounds on the distance between a frame's origins in A and B, for boxes of configurations.
+    """Upper bounds on distances in boxes.
 
-    `names` must contain every variable that changes the distance.
+    Args:
+        names: Every variable that changes the distance.
     """
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
@@ -313,9 +341,14 @@ class BoxBounds:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Return upper bounds (n,) on |D + sum_i D_i x_i| in boxes, for |x_i| <= h_i.
+        """Return upper bounds on |D + sum_i D_i x_i|.
 
-        `c` (n, variables) contains the centers of the boxes, and `h` (variables,) their half widths.
+        Args:
+            c: (n, variables) box centers.
+            h: (variables,) half widths.
+
+        Returns:
+            (n,) bounds, m.
         """
         D, G = self.evaluate_at_centers(c)
         size = np.sqrt((D * D).sum(axis=1))
@@ -324,7 +357,14 @@ class BoxBounds:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def evaluate_at_centers(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the position differences (n, 3) and their derivatives (n, 3, variables) at `c`."""
+        """Return D and its derivatives D_i.
+
+        Args:
+            c: (n, variables) box centers.
+
+        Returns:
+            D (n, 3), and D_i (n, 3, variables).
+        """
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -336,9 +376,12 @@ class BoxBounds:
     def _origin(
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) of a point, and the Jacobian (n, 3, nv) of this position.
+        """Return a point's position and Jacobian.
 
-        The point is fixed in the frame `frame`, and has the coordinates `tool` (3,), m, in this frame.
+        `tool` (3,) contains the point's coordinates in `frame`, m.
+
+        Returns:
+            (n, 3) position, and (n, 3, nv) Jacobian.
         """
         inputs = _flat_inputs(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
@@ -351,10 +394,17 @@ class BoxBounds:
 def tighten(
     search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MAX_BOXES
 ) -> float:
-    """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
+    """Prove a smaller upper bound.
 
-    `upper` (m) must be a proven bound. The result is `upper` or a smaller proven bound. The function ends
-    when the bound `target` (m) is proven, or when more boxes than `most` would be needed.
+    Args:
+        search: Search for distances.
+        frame: Matching frames.
+        target: Sufficient bound, m.
+        upper: A proven bound, m.
+        most: Maximum number of boxes.
+
+    Returns:
+        The smallest proven bound, m.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
@@ -397,7 +447,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return how often a box must be halved until the term (1/2) sum_ij M_ij h_i h_j is below `upper`."""
+    """Return the number of halvings until (1/2) sum_ij M_ij h_i h_j < `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

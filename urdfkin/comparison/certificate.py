@@ -43,14 +43,14 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 
 
 class CertifiedModel(TypedDict):
-    """Name and source of one of the two compared models."""
+    """Name and source of a model."""
 
     name: Annotated[str, doc("Name of the robot.")]
     source: Annotated[str, doc("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
-    """Mimic rule: the joint's value is multiplier * (value of `mimicked_joint`) + offset."""
+    """Mimic rule: value = multiplier * (mimicked value) + offset."""
 
     mimicked_joint: Annotated[str, doc("Name of the mimicked joint.")]
     multiplier: Annotated[float, doc("Factor by which the mimicked joint's value is multiplied.")]
@@ -61,7 +61,7 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 
 
 class DifferenceEntry(TypedDict):
-    """A difference between the two models at one joint or link."""
+    """A difference between the two models."""
 
     place: Annotated[str, doc("Name of the joint or link of A that differs.")]
     what: Annotated[
@@ -81,7 +81,7 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """The pose of a planar or floating joint in B is before * (pose in A) * behind."""
+    """Pose conversion: before * (pose in A) * behind."""
 
     before: Annotated[Matrix, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
@@ -95,7 +95,7 @@ class CertifiedConversion(TypedDict):
 
 
 class CertifiedJoint(TypedDict):
-    """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
+    """Matching joints of A and B."""
 
     a: Annotated[str, doc("Name of the joint in A.")]
     b: Annotated[str, doc("Name of the joint in B.")]
@@ -108,10 +108,7 @@ class CertifiedJoint(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """Two matching links that are fixed to matching rigid bodies in different poses.
-
-    For example, the tool link of A can be 0.1 m further along the last link than the tool link of B.
-    """
+    """Two matching links with different poses on one rigid body."""
 
     a: Annotated[str, doc("Link of A.")]
     b: Annotated[str, doc("Link of B.")]
@@ -119,9 +116,9 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors.
+    """Displacements that `same` treats as rounding errors.
 
-    The distance holds while each planar, floating or unlimited prismatic joint travels at most 10 m.
+    The distance holds if joints without limits travel at most 10 m.
     """
 
     metres: Size
@@ -129,7 +126,7 @@ class Rounding(TypedDict):
 
 
 class FrameEntry(TypedDict):
-    """An interval that contains the largest distance between a frame of A and the matching frame of B."""
+    """Interval of a frame's largest distance."""
 
     frame: Annotated[str, doc("Link of A.")]
     frame_b: Annotated[str, doc("Link of B.")]
@@ -170,7 +167,7 @@ class Confirmed(TypedDict):
 
 
 class SameCertificate(Header):
-    """Certificate of a comparison of two robot models: the verdict, and the proof's data in m and rad."""
+    """Certificate of a result of `same`."""
 
     a: CertifiedModel
     b: CertifiedModel
@@ -257,15 +254,13 @@ def difference_text(entry: DifferenceEntry) -> str:
 
 
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
-    """Check a certificate against two models, and return a line of text for each wrong statement.
+    """Check a certificate against two models.
 
-    The check uses the pairs of joints in the certificate. If the verdict is "differs", the function also
-    searches for other pairs of joints. The certificate is wrong if the verdict for the new pairs is not
-    "differs". For each lower bound, urdfkin and Pinocchio compute the distance at the configurations `q_a`
-    and `q_b`. Each upper bound is proven again.
+    Returns:
+        A line for each wrong statement.
 
     Raises:
-        InputError: the certificate was made for other models, or names an unknown joint or link.
+        InputError: the certificate was made for other models.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -396,10 +391,7 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return the first error in a certificate's base pose, joint conversions and joint orders.
-
-    Without such an error, return None.
-    """
+    """Return the first impossible alignment choice."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -421,7 +413,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO_TOLERANCE) -> bool:
-    """Compare two entries; the last digits of numbers may differ."""
+    """Compare two entries up to rounding."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -471,10 +463,9 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield an error message for each bound of an interval in a certificate that is wrong or not proven.
+    """Yield an error for each wrong or unproven bound.
 
-    `rounding` contains the distance (m) and the angle (rad) that rounding errors can cause between matching
-    frames. If `sharply` is true, the check may use branch and bound, a slow method.
+    If `sharply` is true, the check may use branch and bound.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

@@ -51,10 +51,11 @@ Value = float | str
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """One changed attribute, or an element that only one version has.
+    """A changed attribute, or an element of one version.
 
-    `what` is the attribute, for example "origin x", or "" for a new or removed element. For two versions of
-    different formats, `size` can be a text such as "38.14 mm off", which describes the change.
+    Attributes:
+        what: For example "origin x"; empty for a whole element.
+        size: For versions of different formats: a text such as "38.14 mm off".
     """
 
     element: str
@@ -80,7 +81,7 @@ class ModelChange:
 
 
 def format_value(value: Value | None) -> str:
-    """Return a value as text; a number has enough digits to be read back exactly."""
+    """Return text that reads back exactly."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
@@ -94,11 +95,11 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of the changes of one joint, while all other joints are unchanged.
+    """Effect of one changed joint alone.
 
     Attributes:
-        element: The changed element, for example "joint elbow".
-        interval: The frame with the largest displacement, and bounds on this displacement.
+        element: For example "joint elbow".
+        interval: Bounds on the largest displacement of a frame.
     """
 
     element: str
@@ -114,18 +115,17 @@ class Effect:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """The changes between two versions of a description; the result of `urdfkin.diff`.
+    """The changes between two versions; the result of `urdfkin.diff`.
 
     Attributes:
-        sources: The sources of the old and the new version, as the user gave them.
-        changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
-        effects: One effect for each joint whose changes move links. To compute the effect of a joint, urdfkin
-            changes this joint in the old version, and leaves all other joints unchanged. A joint whose effect
+        sources: Sources of the old and the new version.
+        changes: The changes of the robot's name, then of joints, then of links.
+        effects: The effect of each changed joint, while all other joints are unchanged. A joint whose effect
             cannot be computed, such as a new joint, has no entry.
-        total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
-            `changes` does not list this error. None if single precision does not explain all differences
-            between the models. Infinite if the bound was not computed.
+        total: The frame with the largest displacement by all changes; None if no frame moves.
+        rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
+            does not list these errors. None if single precision does not explain all differences. Infinite if
+            the bound was not computed.
     """
 
     sources: tuple[str, str]
@@ -139,21 +139,20 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """The effect for each changed joint, by the element's name, for example "joint elbow"."""
+        """The effects by element, for example "joint elbow"."""
         return {effect.element: effect for effect in self.effects}
 
 
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
-    """List the changes from one version of a description to another, attribute by attribute.
+    """List the changes between two versions of a robot description.
 
-    If the versions have different formats (URDF, MJCF, USD), the changes are the differences that `same`
-    finds. The listed joints and links have the names of the old version.
+    Versions of the same format are compared attribute by attribute. For different formats (URDF, MJCF, USD),
+    the changes are the differences that `same` finds. Joints and links have the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
         b: The new version: a robot, or a source for `load`.
-        effects: Whether to compute, for each changed joint, a bound on the displacement of the frames after
-            the joint.
+        effects: Whether to bound the displacements that each changed joint causes.
 
     Raises:
         UrdfError: a version has errors. SourceError, UnknownNameError, InputError: as for `load`.
@@ -228,7 +227,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences that `same` finds if the models cannot be compared joint by joint."""
+    """Yield changes with a size."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -254,7 +253,7 @@ def _change_of(one: Difference) -> Iterator[ModelChange]:
 
 
 def _rename_like_a(result: Sameness) -> KinematicTree:
-    """Return B's tree with A's names for all matched joints and links."""
+    """Rename matched joints and links of B like those of A."""
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
@@ -294,7 +293,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Map names such as "origin x" to the attributes of an element and its children."""
+    """Map names such as "origin x" to attributes."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -326,9 +325,9 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Replace the joint `name` of the old tree by the joint of the new tree, and return the effect.
+    """Return the effect of one joint.
 
-    Return None if no frame moves, or if the effect cannot be computed.
+    None: no frame moves, or the effect cannot be computed.
     """
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:

@@ -42,10 +42,10 @@ _MAX_CHARACTERS = 200
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
-    """A joint that a library and urdfkin read differently.
+    """A joint that a library reads differently.
 
-    The compared poses are the poses of the child link in the parent link's frame. `size` is the largest
-    difference between two matching entries of these matrices.
+    Attributes:
+        size: Largest difference of pose entries.
     """
 
     joint: str
@@ -56,14 +56,12 @@ class ReaderDifference:
 
 @dataclass(frozen=True, slots=True)
 class LibraryReading:
-    """How another library reads a robot file, and how the result differs from urdfkin's result.
+    """How a library reads a file.
 
     Attributes:
-        refused: Reason why the library does not read the file; None if it reads the file.
-        missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
-            the USD file) are listed.
-        worst: Largest difference between two matching entries of link poses. The poses are relative to the
-            first common link. The value is 0 if rounding can explain the difference.
+        refused: Reason for refusing the file.
+        missing: Links that the library lacks.
+        worst: Largest difference of link poses; 0 within rounding.
     """
 
     library: str
@@ -90,16 +88,13 @@ def installed_libraries(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare how urdfkin and other libraries read a robot's file.
+    """Compare urdfkin with other libraries.
 
-    If `libraries` is None, the function uses all installed libraries that read the file's format. The poses
-    of all links are compared at q = 0 and at random configurations.
+    By default, all installed libraries for the file's format are used.
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or no installed library reads the file's format. The robot has
-            a locked joint, or was loaded from MJCF text instead of a file. The robot is from a USD file with
-            a selected variant or articulation.
+        InputError: a library is not installed, or cannot load the robot as urdfkin did.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
@@ -136,7 +131,7 @@ def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Run a library in a separate process, and compare its link poses with urdfkin's link poses `ours`."""
+    """Compare a library's poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -185,7 +180,11 @@ def _compare_reader(
 
 
 def _library_input(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
+    """Return the input for other libraries.
+
+    Returns:
+        URDF text or path, and format.
+    """
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -202,7 +201,7 @@ def _library_input(robot: Robot) -> tuple[str, str]:
 
 
 def _remove_shapes(text: str) -> str:
-    """Return a URDF without shapes, because some libraries search the disk for mesh files."""
+    """Remove shapes, because some libraries search the disk for meshes."""
     from xml.etree.ElementTree import tostring
 
     robot = parse_xml(text)
@@ -242,10 +241,12 @@ def _differences(
 def _find_cause(
     joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
 ) -> tuple[str, str]:
-    """Return the element that causes a difference, and a description of the difference.
+    """Return the cause of a difference.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
-    pose is at q = 0.
+    `T` and `T_theirs` are poses in the parent link's frame. The first pose is at q = 0.
+
+    Returns:
+        An element, and a description.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

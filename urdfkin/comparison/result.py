@@ -47,8 +47,7 @@ _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 class Verdict(Enum):
     """Verdict of a comparison of two models.
 
-    `UP_TO_SINGLE` means that each joint differs by no more than the rounding of its numbers to single
-    precision.
+    `UP_TO_SINGLE`: single precision explains the difference at each joint.
     """
 
     SAME = "same"
@@ -66,11 +65,12 @@ BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """A condition for the result of a comparison; `Sameness.holds` checks the condition.
+    """A condition for the result of a comparison.
 
-    `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
-    models. If `within` is None, the verdict must not be `Verdict.DIFFERS`. If `strict` is true, there must be
-    no remarks, and the verdict must not be `Verdict.SAME_AFTER`.
+    Attributes:
+        within: Largest allowed distance (m) and angle (rad) between matching frames of the unchanged models.
+            None: the verdict must not be `Verdict.DIFFERS`.
+        strict: Whether remarks and the verdict `Verdict.SAME_AFTER` are forbidden.
     """
 
     within: float | None = None
@@ -79,18 +79,17 @@ class SameQuestion:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An interval that contains the largest distance between a frame of A and the matching frame of B.
+    """An interval that contains the largest distance between two matching frames.
 
     The largest distance is taken over all configurations within the joint limits.
 
     Attributes:
         frame: The link of A.
         frame_b: The link of B.
-        lower: Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`,
-            minus the largest rounding error.
-        upper: Proven upper bound of the distance, metres; inf if there is no bound.
-        radians: Proven upper bound of the angle between the two orientations of the frame.
-        radians_seen: The angle between the two orientations at `q_a` and `q_b`.
+        lower: Lower bound of the largest distance, m: the distance at `q_a` and `q_b`, minus rounding errors.
+        upper: Proven upper bound of the distance, m; inf without a bound.
+        radians: Proven upper bound of the angle between the frames.
+        radians_seen: The angle between the frames at `q_a` and `q_b`.
         q_a: Configuration of A.
         q_b: The corresponding configuration of B.
     """
@@ -121,12 +120,12 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
-        a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
-        b: The parameter's value in B. None if the parameter has no value.
-        radians: Angular part of the difference, radians; 0 if the difference has no angular part.
-        metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: Details of the difference. "alone": the joint's axis differs, but the links after the joint
-            agree. "converted": the limits of B were converted to the coordinate of A. Otherwise empty.
+        a: The parameter's value in A; None without a value.
+        b: The parameter's value in B; None without a value.
+        radians: Angular part of the difference, rad.
+        metres: Linear part of the difference, m.
+        detail: "alone": the axis differs, but the links after the joint agree. "converted": the limits of B
+            are in A's coordinate. Otherwise empty.
     """
 
     place: str
@@ -139,7 +138,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
+        """The values in A and B; None for a missing value."""
         if self.what == "limits":
             return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
@@ -221,16 +220,15 @@ def _format_range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference at one joint or link that rounding does not explain.
+    """A difference that rounding does not explain.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
-        what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base".
-            The text is empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if `b` is a description in words.
-        b: The parameter's value in B, or a description in words. The description states the difference, or
-            the reason why the models cannot be compared at this joint or link.
-        explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
+        what: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base". Empty if the
+            models cannot be compared at this joint or link.
+        a: The parameter's value in A; None if `b` is a description.
+        b: The parameter's value in B, or a description in words.
+        explained: The largest difference that rounding can cause, as text; empty if no number is rounded.
     """
 
     place: str
@@ -247,9 +245,10 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Two matched links that `same` reports as different tools (end-effector frames).
+    """Two matched links that `same` reports as different tools.
 
-    `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
+    Attributes:
+        pose: (4, 4) pose of `b` in the frame of `a`.
     """
 
     a: str
@@ -266,10 +265,12 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Result of Pinocchio's check of the bounds, or the reason why the bounds were not checked.
+    """Result of Pinocchio's check of the bounds.
 
-    `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
-    configurations.
+    Attributes:
+        configurations: Number of checked configurations.
+        metres: Largest distance that Pinocchio computed, m.
+        reason: Reason for a missing check.
     """
 
     state: ConfirmationState
@@ -287,10 +288,14 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
+    """A joint of A and the matching joint of B.
 
-    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B define the joint's frames
-    differently, `conversion` converts the pose in A to the pose in B.
+        value in B = sense * (value in A) + offset
+
+    Attributes:
+        sense: 1 or -1; 1 for planar and floating joints.
+        offset: rad or m; 0 for planar and floating joints.
+        conversion: Pose conversion of a planar or floating joint.
     """
 
     a: str
@@ -311,40 +316,32 @@ class Sameness(Displayable):
         sources: The sources of A and B, as the user gave them.
         digests: SHA-256 of the two texts.
         verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
-        after: The changes that bring B closest to A, with one line of text for each change. The changes are
-            listed even if the models still differ after these changes.
+        after: The changes that bring B closest to A, one line each. The models may differ even after these
+            changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
-        remarks: Differences that do not affect motion: joint limits, joint types, and links that only one
-            model has.
+        remarks: Differences without effect on motion: joint limits, joint types, links of one model.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
-        tools: Pairs of matched links with different poses on the same rigid body. `same` reports the two
-            links as different tools.
-        orders: Groups of consecutive joints whose order differs between A and B. The motion of the robot does
-            not depend on the order of these joints.
-        base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
-            if the two roots coincide.
-        base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
-            the poses of B relative to the second link. The two links belong to matching rigid bodies.
-        rounding: (m, rad) the largest distance and angle between matching frames that rounding errors can
-            cause.
-        unlimited: Planar and floating joints of A, and prismatic joints with unlimited travel. All bounds on
+        tools: Matched links with different poses on the same rigid body.
+        orders: Groups of consecutive joints whose order differs. The order does not affect the motion.
+        base: (4, 4) pose of B's root in A's root frame at zero. The identity if the roots coincide.
+        base_links: Links of A and B to which the poses are relative.
+        rounding: (m, rad) largest distance and angle that rounding errors can cause between matching frames.
+        unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
             distances hold while each of these joints travels at most 10 m.
-        single: (m, rad) largest distance and angle between matching frames that rounding to single precision
-            can cause. None if no file has single precision.
-        unexplained: Differences between the unchanged models, each at one joint or link. Rounding does not
-            explain these differences. The numbers of a USD file are rounded to single precision.
-        frames: One interval for each pair of matching links. The interval contains the largest distance
-            between the two links. The changes in `after` are applied to B before the distance is computed.
-        as_written: The interval for the frame with the largest distance between the models as they are
-            written. None if `after` is empty.
-        bound_as_written: (m, rad) proven bounds on the distance and on the angle between matching frames of
-            the unchanged models. The bounds hold for all pairs of matching frames. The bounds are infinite if
-            no bounds were proven. If one model is a Denavit-Hartenberg table, only frames with the same name
-            in A and B are compared.
-        narrowed: One line of text for each mimicked joint with a larger range than the limits of its mimic
-            joints allow. The distances in `frames` are computed for the whole range of the mimicked joint.
+        single: (m, rad) largest distance and angle that single precision can cause between matching frames.
+            None if no file has single precision.
+        unexplained: Differences between the unchanged models that rounding does not explain, by joint or
+            link.
+        frames: One interval for each pair of matching links, after the changes in `after`.
+        as_written: The interval with the largest distance between the unchanged models. None if `after` is
+            empty.
+        bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
+            unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
+            with equal names in A and B are compared.
+        narrowed: One line for each joint whose mimic joints have tighter limits. The distances in `frames`
+            are computed for the whole range of this joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
@@ -397,9 +394,7 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The interval with the largest bound; None if no frame differs by more than rounding.
-
-        If two intervals have equal bounds on the distance, their bounds on the angle are compared.
+        """The interval with the largest bound; None if all frames agree.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -415,7 +410,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The frame with the largest distance between A and the unchanged B, and bounds on this distance.
+        """The frame with the largest distance between the unchanged models.
 
         A and B are compared at equal joint values.
 
@@ -428,7 +423,7 @@ class Sameness(Displayable):
 
     @property
     def up_to_single(self) -> bool:
-        """Whether the models differ, and single precision explains every difference in motion.
+        """Whether single precision explains every difference in motion.
 
         Each joint is checked separately. For models without a difference, the result is False.
 
@@ -440,11 +435,11 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ, but single precision can explain the displacement of every frame.
+        """Whether single precision can explain the displacement of every frame.
 
-        The models are compared as they are written. The limit is the sum of the rounding errors of all
-        joints. A wrong number in one joint can move a frame by less than this limit. Therefore, only
-        `up_to_single` proves that rounding is the cause.
+        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. The
+        effect of a wrong number can be below this limit. Therefore, only `up_to_single` proves that rounding
+        is the cause. The result is False unless `verdict` is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -460,12 +455,11 @@ class Sameness(Displayable):
         )
 
     def within(self, most: float) -> bool:
-        """Return whether distance (m) and angle (rad) of all matching frames are proven to be at most `most`.
+        """Return whether all matching frames are within `most` (m and rad).
 
-        The models are compared as they are written: their roots coincide, and their coordinates are equal. A
-        different base pose, a different tool frame, or a different zero position of a joint can therefore
-        increase the distance. The result is False if the types of two matching joints differ, or if a joint
-        exists in one model only.
+        The unchanged models are compared: their roots coincide, and their coordinates are equal. Different
+        base poses, tool frames and joint zeros can therefore increase the distance. The result is False if
+        matching joints have different types, or if only one model has a joint.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -477,7 +471,7 @@ class Sameness(Displayable):
         ) <= most
 
     def holds(self, question: SameQuestion) -> bool:
-        """Return whether the result meets the condition `question`.
+        """Return whether the result meets a condition.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -489,13 +483,11 @@ class Sameness(Displayable):
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """Return the exit code: 0 if the models are equivalent or within the given distance, else 1.
+        """Return 0 if the models are equivalent or within a distance, else 1.
 
         Args:
-            strict: If true, the exit code is 1 for models with remarks, such as different joint limits. With
-                `strict`, the verdict `Verdict.SAME_AFTER` also causes the exit code 1.
-            within: Largest allowed distance (m) and angle (rad) between matching frames of the unchanged
-                models.
+            strict: Whether remarks and the verdict `Verdict.SAME_AFTER` also give 1.
+            within: Largest allowed distance (m) and angle (rad) between frames of the unchanged models.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -505,10 +497,10 @@ class Sameness(Displayable):
         return int(not self.holds(SameQuestion(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
-        """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
+        """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
-        If the models are equivalent, A at q and B at the converted q have equal poses, except for differences
-        in `base` and `tools`. A coordinate that only B has is set to its value in the neutral configuration.
+        Equivalent models have equal poses at both configurations, except for `base` and `tools`. Coordinates
+        that only B has are neutral.
 
         Raises:
             InputError: q does not have A's length.
@@ -538,15 +530,15 @@ class Sameness(Displayable):
         return out
 
     def convention(self) -> Convention:
-        """Return a convention for A with the names, order, directions and zero offsets of B's joints.
+        """Return a convention that converts A's coordinates to B's.
 
-        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. If
-        the models are equivalent, A at q and B at the converted q have equal poses, except for differences in
-        `base` and `tools`.
+        The convention has the names, order, directions and zeros of B's joints. With this convention, A's
+        `robot.convention(...)` converts q, v, a and Jacobians. Equivalent models have equal poses at A's q
+        and B's q, except for `base` and `tools`.
 
         Raises:
-            InputError: a coordinate of one model has no matching coordinate in the other model. The error is
-                also raised if a planar or floating joint has different frames in A and B.
+            InputError: a coordinate has no match in the other model, or the frames of a planar or floating
+                joint differ.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur5_limited")
@@ -603,7 +595,7 @@ def length(metres: float) -> str:
 
 
 def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
-    """Return an interval as text: the lower bound, and the upper bound if its text is different.
+    """Return an interval as text.
 
     >>> up_to(length, 0.025, 0.025), up_to(angle, 0.4297, 0.4327), up_to(length, 1.0, math.inf)
     ('25 mm', '429.7 mrad (at most 432.7 mrad)', '1 m (without bound)')
@@ -630,7 +622,7 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def size_words(metres: float, radians: float) -> str:
-    """Return the size of a difference as text; a part that is 0 is omitted.
+    """Return a displacement as text.
 
     >>> size_words(0.0019, 0.0003), size_words(0.0, 0.0003)
     ('1.9 mm off and turned by 0.3 mrad', 'turned by 0.3 mrad')
@@ -651,11 +643,13 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A, as (kind, text).
+    """Return the changes that make B equal to A.
 
-    The function also stores the tool poses in `alignment`. If `tables` is true, every frame with a different
-    pose is treated as a tool. The reason is that the frames of a Denavit-Hartenberg table depend on the
-    table's convention.
+    Tool poses are stored in `alignment`. The frames of a Denavit-Hartenberg table depend on its
+    convention. With `tables`, every displaced frame is a tool.
+
+    Returns:
+        (kind, text) of each change.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -692,11 +686,6 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield ("tools", text) for each tool whose pose differs.
-
-    A tool is a link that is fixed to its parent and has no child. A link of the robot's mounting, such as a
-    pedestal, is also treated as a tool.
-    """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
         is_mount = (frame.a, frame.b) in mounts
@@ -715,7 +704,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return the pairs of matching links that belong to the robot's mounting, such as a pedestal."""
+    """Return the links of the mounting, such as a pedestal."""
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -736,10 +725,10 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return two sets of links of the root body: supports of the robot, and links without moving joints.
+    """Return links around the robot.
 
-    A support, such as a pedestal, has a fixed child link that carries all moving joints. A link without
-    moving joints is, for example, a table next to the robot.
+    Returns:
+        Links before all moving joints, and links without moving joints.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -859,7 +848,11 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and the shift (m); a value that rounding errors can explain is replaced by 0."""
+    """Return tilt and shift beyond rounding.
+
+    Returns:
+        Tilt, rad, and shift, m; 0 within rounding.
+    """
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 
@@ -871,10 +864,9 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the differences that do not affect motion.
+    """Return differences without effect on motion.
 
-    `single` is the relative rounding error of a number in single precision. If the numbers of both models
-    have double precision, `single` is 0.
+    `single` is the relative rounding error of single precision, or 0.
     """
     some = list[Difference]()
     for step in alignment.steps:
@@ -916,12 +908,14 @@ def is_idle(joint: Joint) -> Lock | None:
 def limit_differences(
     a: Joint, b: Joint, tolerance: float, single: float, zero: tuple[int, float] = (1, 0.0)
 ) -> Iterator[Difference]:
-    """Yield the differences between two joints' kinds and limits.
+    """Yield differences of kinds and limits.
 
-    `tolerance` is a relative tolerance for limits. If both limits have absolute values below 1 (rad or m),
-    `tolerance` is an absolute tolerance. `single` is the relative rounding error of a limit in single
-    precision. If the limits of both models have double precision, `single` is 0. With `zero` = (sign,
-    offset), the joint's value in B is sign * (value in A) + offset.
+    Args:
+        a: The joint of A.
+        b: The joint of B.
+        tolerance: Relative; absolute below 1.
+        single: Relative error of single precision, or 0.
+        zero: (sign, offset); value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

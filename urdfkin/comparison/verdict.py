@@ -81,26 +81,31 @@ def same(
 ) -> Sameness:
     """Decide and prove whether two models move alike in every configuration.
 
-    The product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H is the pose of a link. Here S_i are the
-    screws of the joints, and H is the link's pose in the zero configuration. If two models have equal screws
-    S_i and equal poses H, the models move alike for all q. The models may still have different base poses,
-    fixed links, joint zeros, joint directions, names, coordinate orders and tool frames.
+    The pose of a link is a product of exponentials:
+
+        T(q) = exp(S_1 q_1) ... exp(S_n q_n) H
+        S_i: screw of joint i
+        H: pose of the link in the zero configuration
+
+    Two models with equal screws S_i and equal poses H move alike for all q. The models may still differ in
+    names, coordinate order, fixed links and base pose. Joint zeros, joint directions and tool frames may also
+    differ.
 
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
         map: Joint names of `a`, each with the name of the matching joint in `b`. Only joints that urdfkin
             cannot match by names and axes need an entry.
-        bounds: Whether to bound the largest distances between frames. If the models differ, the computation
-            of the bounds takes most of the time.
-        boxes: Maximum number of boxes of configurations that exist at the same time in branch and bound.
-            Boxes give sharper bounds if the models differ in many places. With 0, no boxes are used.
-        within: Limit (m and rad) that you will pass to `Sameness.within`. Branch and bound then tries to
-            prove that the distance (m) between all matching frames is at most this limit.
+        bounds: Whether to bound the largest distances between frames. For different models, these bounds take
+            most of the time.
+        boxes: Maximum number of boxes of configurations in branch and bound. Boxes give sharper bounds if the
+            models differ in many places. With 0, no boxes are used.
+        within: Limit (m and rad) for `Sameness.within`. Branch and bound then tries to prove this limit for
+            the distances of all matching frames.
 
     Returns:
         The verdict, the matched joints and links, the differences, and an interval for every frame. The
-        interval contains the frame's largest distance over all configurations within limits.
+        interval contains the frame's largest distance within the joint limits.
 
     Raises:
         UrdfError: a model has errors.
@@ -203,7 +208,10 @@ class Comparator:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals, and store the tool frames in `alignment`."""
+        """Return the result without intervals.
+
+        Tool frames are stored in `alignment`.
+        """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance, tables=self.has_table)
@@ -265,7 +273,11 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound the distance and the angle (m, rad) that single precision can cause."""
+        """Bound the effect of single precision.
+
+        Returns:
+            Distance, m, and angle, rad.
+        """
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -295,7 +307,7 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models; joints and comparable links are matched as in `alignment`."""
+        """Align the unchanged models, matched as in `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -326,12 +338,22 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the distance (m) and the angle (rad) that rounding can cause between matching frames.
+        """Bound the displacement of frames that rounding can cause.
 
-        `same` ignores a small rounding difference at each joint. These differences add up along the path. If
-        an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
-        and the frame. Therefore, the bound on the distance assumes that each joint in `Sameness.unlimited`
-        travels at most `ASSUMED_LIMIT`.
+        `same` ignores a small difference at each joint:
+
+            d, e             ignored distance (m) and angle (rad) at one joint
+            depth            largest number of joints on a path, plus 1
+            slides, turns    sums of the rounding errors of joint values (m, rad)
+            reach            largest lever arm: longest path, plus the travels of all joints (m)
+
+            angle <= depth e + turns
+            distance <= depth d + slides + angle * reach
+
+        Each joint in `Sameness.unlimited` is assumed to travel at most `ASSUMED_LIMIT`.
+
+        Returns:
+            Distance, m, and angle, rad.
         """
         pairs = [
             (step.kind, pair)
@@ -370,7 +392,11 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return bounds on distance (m) and angle (rad) of all matching frames of the unchanged models."""
+        """Bound displacements between unchanged models.
+
+        Returns:
+            Distance, m, and angle, rad.
+        """
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -402,7 +428,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Try to prove by branch and bound that matching frames are within `target` (m)."""
+        """Try to reduce `uppers` to `target`."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -438,9 +464,9 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """Return a frame's interval.
+        """Return the interval of a frame.
 
-        `attained` contains the largest distance (m) found, and the values of the variables at this distance.
+        `attained` contains a distance (m) and the values of the variables.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -477,7 +503,11 @@ class Comparator:
         )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Return each frame's largest distance (m) that Pinocchio computes at random configurations."""
+        """Return the distances that Pinocchio computes.
+
+        Returns:
+            (frames,) largest distances, m.
+        """
         search = self.search(alignment, variables)
         q_a, q_b = search.configurations(search.random_values(CONFIRMATION_SAMPLES), random_free_joints=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
@@ -493,9 +523,10 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield each matched joint that translates, and the joint's largest travel (m).
+    """Yield translating joints and their travels.
 
-    The travel is infinite for planar and floating joints, and for prismatic joints without limits.
+    Yields:
+        A joint, and its travel, m; inf without limits.
     """
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
@@ -510,10 +541,9 @@ def _joints_fixed_in_one(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the indices of the fixed joints of `tree` that are moving joints in `other`.
+    """Return the fixed joints that move in `other`.
 
-    Two joints match if they have equal names, or if their child links have equal names. `names` maps names of
-    joints in `tree` to the names in `other`, and `labels` contains the links' names.
+    `names` maps joint names of `tree` to names of `other`.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -533,9 +563,9 @@ def _fix_idle_joints(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Return the tree with each mimic joint of multiplier 0 fixed at its offset.
+    """Fix mimic joints with multiplier 0.
 
-    The joint remains a mimic joint if the matching joint of the other model moves.
+    A joint is not fixed if the matching joint moves.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -557,9 +587,10 @@ def _never_moves(joint: Joint) -> bool:
 def _match_usd_spellings(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return the link names of both robots, and the pairs of joints that USD spells differently.
+    """Match names that USD spells differently.
 
-    USD restricts names. Where possible, the links of a USD robot get the names of the other robot's links.
+    Returns:
+        Common link names, and matching joints.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -575,7 +606,7 @@ def _match_usd_spellings(
 
 
 def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map the spelling in the USD file to the original name in `names`."""
+    """Map USD spellings to original names."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -585,11 +616,13 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame for unchanged models.
+    """Return the pose of B's root.
 
-    If a link on B's root body has the name of A's root, this link coincides with A's root. If a link on A's
-    root body has the name of B's root, this link coincides with B's root. Without such a link, the two roots
-    coincide.
+    The roots coincide by default. If B's root body contains a link named like A's root, the two coincide.
+    The same rule holds with A and B exchanged.
+
+    Returns:
+        (4, 4) pose in A's root frame.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.zero_poses[link])
@@ -609,75 +642,78 @@ def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:
 
 
 class JointComparison:
-    """Prove joint by joint that single precision is the cause of every difference between two models.
+    """Prove joint by joint that single precision causes every difference.
 
-    The rounding errors of all joints add up in the pose of a frame. A wrong number in one joint can move a
-    frame by less than the sum of these errors. A comparison of frame poses does not detect this wrong number.
-    For this reason, the proof compares the models joint by joint. Each joint may differ only by the rounding
-    of the numbers that define this joint.
+    The rounding errors of all joints together can move a frame farther than one wrong number. Therefore, each
+    joint may differ only by the rounding of its own numbers.
 
-    **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
-    may shift the origin of a joint along the joint's axis. A converter may add or merge fixed links. The
-    proof therefore compares quantities that do not depend on the choice of frames. For a link in A, let P be
-    the nearest ancestor that B also has. For each link that both models have, the proof compares three
-    quantities in the zero configuration, in the frame of P:
+    **Compared quantities.** Two files can describe the same joint by different frames, and can have different
+    fixed links. The compared quantities do not depend on these choices:
 
-    - the pose of the link;
-    - the direction and the line of the axis of each joint between P and the link;
-    - the multiplier and the offset of each mimic rule.
+        P            nearest ancestor of a link in A that B also has
 
-    By the product of exponentials, these quantities determine the pose of each common link in every
-    configuration. The models are compared as they are written. The roots of A and B coincide. No joint
-    direction, joint zero or tool frame is changed.
+        in the zero configuration, in the frame of P:
+            pose of the link
+            direction and line of the axis of each joint between P and the link
+        multiplier and offset of each mimic rule
 
-    **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding of the numbers of
-    joint i can shift and rotate the frame after joint i. Let w_i be the largest shift (m), and e_i the
-    largest rotation (rad). The function `urdfkin.verify.usd_check.bound_single_precision_errors` computes w_i
-    and e_i from the numbers of joint i. Let R_i be the constant rotation of joint i, and p_i the position of
-    its origin. Let R*_i and p*_i be the exact values. The angle of a product of rotations is at most the sum
-    of their angles. The angle between the product R_1 ... R_n and the product R*_1 ... R*_n is therefore at
-    most
+    By the product of exponentials, these quantities determine the poses of all common links. The roots of A
+    and B coincide, and no joint direction, joint zero or tool frame is changed.
 
-        e_1 + ... + e_n.
+    **Bound.** Exact values have an asterisk.
 
-    Let W be the position error (m) and E the rotation error (rad) of the frame before joint i. The position
-    error of the frame after the joint is then at most
+        1 ... n      joints on the path from P to the link
+        R_i, p_i     constant rotation and origin of joint i
+        w_i, e_i     largest shift (m) and rotation (rad) of the frame after joint i, if the numbers of
+                     joint i are rounded (`urdfkin.verify.usd_check.bound_single_precision_errors`)
+        R            rotation of the frame before joint i
+        W, E         position error (m) and rotation error (rad) of this frame
 
-        W + E |p_i| + w_i.
+        angle of a product of rotations <= sum of their angles
+        angle between R_1 ... R_n and R*_1 ... R*_n <= e_1 + ... + e_n
 
-    The reason is the equation R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes
-    through the origin of the frame after the joint, and is fixed in this frame. Therefore, the position error
-    of the axis is at most the position error of this frame. The direction error of the axis is at most the
-    rotation error of this frame. The multiplier and the offset of a mimic rule have a relative error of at
-    most 2^-24.
+        R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i)
+        position error of the frame after joint i <= W + E |p_i| + w_i
 
-    In B, P is not always an ancestor of the link. If P is not an ancestor, P and the link are on two branches
-    that begin at their last common ancestor. Let W and E be the position error and the rotation error of the
-    link relative to this common ancestor. Let V and F be the position error and the rotation error of P
-    relative to the common ancestor. Let d be the distance between the link and P. Then the position error of
-    the link relative to P is at most W + V + F d. The rotation error of the link relative to P is at most
-    E + F.
-    `same` ignores the rounding errors of double precision, so these errors are added to the bounds. If both
-    models are rounded, the bounds of both models are added.
+        axis of joint i: fixed in the frame after the joint, through the origin of this frame
+        position error of the axis <= position error of this frame
+        direction error of the axis <= rotation error of this frame
 
-    **Both orders.** The bound for one joint can contain the rounding of other joints. For example, the
-    joint's parent may be a link that only B has. B may also have additional joints between P and the joint.
-    Therefore, `same` compares A with B, and then B with A. If the first model of a comparison is rounded, two
-    conditions must hold. The path from P to the link has at most one moving joint. In the second model, the
-    joints between the common ancestor and P have no rounded numbers. If a condition does not hold, `same`
-    reports the difference as not explained.
+        relative error of a mimic multiplier or offset <= 2^-24
 
-    **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
-    difference. `same` names the first joint with such a difference. A joint can still have an error that is
-    smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
-    detect this error. The proof has three conditions. In A and in B, the same moving joints lead from P to
-    the link, in the same order. A planar or floating joint is attached to the root body, and is the only
-    joint between P and the link. The frames of this planar or floating joint agree in A and B up to double
-    precision. If a condition does not hold, `same` reports the difference as not explained.
+    *Branches.* In B, P may be on another branch than the link.
 
-    `errors` contains an array (joints, 3) of error bounds for A, and an array for B. The columns are the
-    position error (m), the rotation error (rad), and the relative error of the mimic rule. The bounds are 0
-    for double precision. `base` is the pose (4, 4) of B's root in A's root frame.
+        C            last common ancestor of P and the link
+        W, E         position and rotation error of the link relative to C
+        V, F         position and rotation error of P relative to C
+        d            distance between the link and P
+
+        position error of the link relative to P <= W + V + F d
+        rotation error of the link relative to P <= E + F
+
+    *Sum.* `same` ignores the rounding errors of double precision.
+
+        allowed difference = bound of A + bound of B + errors of double precision
+
+    **Both orders.** The bound for a joint can contain the rounding of additional joints in B. Therefore,
+    `same` compares A with B, and then B with A. If the first model is rounded, two conditions must hold:
+
+    - The path from P to the link has at most one moving joint.
+    - In the second model, the joints from C to P have no rounded numbers.
+
+    **Limits of the proof.** A difference above its bound has another cause. An error below the rounding of a
+    joint's own numbers cannot be detected. The proof has three conditions:
+
+    - In A and in B, the same moving joints lead from P to the link, in the same order.
+    - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
+    - The frames of a planar or floating joint agree in A and B up to double precision.
+
+    If any condition does not hold, `same` reports the difference as not explained.
+
+    Args:
+        errors: (joints, 3) error bounds of A, and of B; 0 for double precision. Columns: position (m),
+            rotation (rad), mimic rule (relative).
+        base: (4, 4) pose of B's root in A's root frame.
     """
 
     def __init__(
@@ -717,9 +753,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return the link's nearest ancestor P that both models have, and the joints from P to the link.
+        """Return P and the joints from P to a link.
 
-        If the models have no common ancestor of the link, P is the link at which the compared paths begin.
+        Without a common ancestor, P is the link in `start`.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -730,7 +766,11 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints that lead from the last common ancestor of two links to each of the links."""
+        """Return the joints after the last common ancestor.
+
+        Returns:
+            Joints to `start`, and to `end`.
+        """
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -783,10 +823,12 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between two joint axes.
+        """Return the angle and distance of two axes.
 
-        The distance is the shortest distance from the joint's origin on one axis to the other axis. For a
-        prismatic joint, the distance is 0, because the axis has only a direction.
+        The distance is measured from the joint's origin on one axis.
+
+        Returns:
+            Angle, rad, and distance, m.
         """
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -794,10 +836,15 @@ class JointComparison:
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
+        """Return screws and the link pose relative to P.
 
-        P and the link have a last common ancestor. The list `back` contains the joints from this ancestor to
-        P. The list `path` contains the joints from this ancestor to the link.
+        Args:
+            which: 0 for A, 1 for B.
+            back: Joints from C to P.
+            path: Joints from C to the link.
+
+        Returns:
+            Both, with error bounds (m, rad).
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)
@@ -818,9 +865,9 @@ class JointComparison:
         return screws, T_P_common @ T, errors_in_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
-        """Return the error bounds (m, rad) of the frame after a joint.
+        """Return the error bounds after a joint.
 
-        `errors` contains the error bounds (m, rad) of the frame before the joint.
+        Bounds are in m and rad.
         """
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
@@ -837,10 +884,7 @@ class JointComparison:
             yield JointDifference(place, what, None, sizes, " and ".join(explained))
 
     def _free_joint_differences(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint.
-
-        The joint must be attached to the root body, and be the only joint on the path to the link.
-        """
+        """Compare a planar or floating joint."""
         ends = list(zip(self.mechanisms, paths, strict=True))
         parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
         bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]

@@ -40,7 +40,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Kinds of acceleration of a joint, in the order of `terms`.
+#: Kinds of acceleration of a joint, in the order of `AccelerationBreakdown.terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 _MAX_DISPLAYED = 2
 
@@ -65,7 +65,7 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """Yield (joint, kind, six numbers) for each nonzero contribution."""
+        """Yield (joint, kind, six numbers) for each nonzero contribution of a sample."""
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):
@@ -105,7 +105,10 @@ class AccelerationBreakdown(Displayable):
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration of a joint, in world axes."""
+    """Velocity or acceleration (n, 3) of a joint relative to its parent link.
+
+    The vectors are in world axes.
+    """
 
     linear: FloatArray
     angular: FloatArray
@@ -126,7 +129,7 @@ def acceleration_breakdown(
     """Split the classical acceleration of a link's frame.
 
     `base` has the shape (n, 24) or (1, 24); see `BaseMotion.state`.
-    `out` has the shape (n, joints, 4, 6).
+    The terms are written to `out` (n, joints, 4, 6).
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
@@ -168,7 +171,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Write `terms`; return the base's acceleration."""
+    """Write the joints' contributions to `terms`; return the base's contribution."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -193,7 +196,10 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return the vectors to the last link, in world axes."""
+    """Return the vectors (n, links, 3) from each link to the last link.
+
+    The vectors are in world axes.
+    """
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -256,9 +262,9 @@ def _relative_motion(joint: Joint, x: FloatArray, R: FloatArray) -> _RelativeMot
 
 
 def _base_acceleration(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration at `d` (7.123).
+    """Return the acceleration of a point fixed to the base (7.123).
 
-    `d` begins at the base's origin.
+    `d` is the vector from the base's origin to the point.
     """
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)

@@ -12,7 +12,7 @@ number of threads.
 | `accelerations` | classical [linear; angular] | (n, frames, 6) | 7.129, 7.130 |
 | `jacobians` | Jacobian | (n, frames, 6, nv) | 7.85 |
 | `jacobian_rates` | time derivative of the Jacobian | (n, frames, 6, nv) | 7.126 |
-| `hessians` | [..., i, j]: derivative of column i for joint velocity j | (n, frames, 6, nv, nv) | |
+| `hessians` | [..., i, j]: derivative of column i along joint velocity j | (n, frames, 6, nv, nv) | |
 | `imus` | [proper acceleration; angular velocity], in frame axes | (n, frames, 6) | |
 """
 
@@ -51,7 +51,8 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Larger results (bytes) are written directly to memory, past the caches.
+#: Smallest size of results that are written directly to memory, bytes.
+#: Such results do not fit into the caches.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
 #: 24 KiB, half of a first-level cache of 48 KiB.
@@ -183,7 +184,7 @@ def _compute_interpreted(
     """Compute a batch with Python numbers.
 
     Returns:
-        None if a kernel becomes available; 1 for invalid inputs, else 0.
+        None if a kernel becomes available; 1 for nan, inf or too large inputs, else 0.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -285,10 +286,11 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
+#: Smallest batch for several threads.
 #: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations per block, to fit into the cache.
+#: Number of configurations per part; intermediate results fit into the cache.
 ROWS_PER_PART = 2048
 
 #: A function that computes rows of `out` from rows of `inputs`.
@@ -311,7 +313,7 @@ def compute_in_blocks(
 ) -> int:
     """Compute `out` in several threads.
 
-    All arrays must be C-contiguous.
+    All arrays must be C-contiguous. An input has n rows, or one row for all configurations.
     `compute` must release Python's global interpreter lock.
     """
     n = len(out)
@@ -346,7 +348,7 @@ def compute_in_parts(compute: Callable[[slice], None], n: int, threads: int | No
     if len(parts_by_thread) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, thread_parts) for thread_parts in parts_by_thread]
-    wait(work)  # All threads must finish writing first.
+    wait(work)  # All threads finish writing before an error is raised.
     for future in work:
         future.result()
     return None

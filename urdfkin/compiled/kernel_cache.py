@@ -19,7 +19,7 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import import_lock, make_fork_safe_lock
 
 #: Lock for the import of Numba and for compilations.
-#: A fork waits for it, because a child cannot finish the parent's compilation.
+#: A fork waits for this lock, because a child cannot finish the parent's compilation.
 #: A fork acquires locks in the reverse order of their creation.
 #: The import of Numba acquires this lock before `logging`'s lock.
 #: `logging`'s lock must therefore be created before this lock.
@@ -71,7 +71,7 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 
 @cache
 def kernel_cache_folder() -> Path | None:
-    """Return None if no folder is writable."""
+    """Return the cache folder, or None if no folder is writable."""
     with import_lock:
         from urdfkin.system.cache import make_cache_folder
 

@@ -24,8 +24,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: Scratch rows of the 16 elements of a pose.
-#: Scratch rows of the six numbers of a velocity or acceleration.
+#: `_POSE_ROWS`: scratch rows of the 16 elements of a pose.
+#: `_SIX_ROWS`: scratch rows of the six numbers of a velocity or acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -46,7 +46,7 @@ def mask_for_velocity(state):
 
 
 def mask_for_acceleration(state):
-    """Mark the linear velocity as unused (7.130)."""
+    """Mark the linear velocity as unused: the acceleration (7.130) does not need it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -89,7 +89,7 @@ def write_acceleration(m, s, program, place, sources, b, reference, state, to):
 def write_imu(m, s, program, place, sources, b, reference, state, to):
     """Write accelerometer and gyroscope readings.
 
-    The base's acceleration must already exclude gravity.
+    The caller must subtract gravity from the base's acceleration.
     """
     _write_six_vector(m, s, program, place, b, state[5], state[2], to)
 
@@ -110,14 +110,14 @@ def write_matrix(m, s, program, place, sources, b, reference, state, to):
 
 
 def store_no_axis(s, row, axis, state):
-    """Do nothing."""
+    """Do nothing: this output has no Jacobian columns."""
 
 
 def write_no_column(s, row, to, flags, g, c, reference, state): ...
 
 
 def store_axis(s, row, axis, state):
-    """Store a joint's axis and origin (7.85)."""
+    """Store a joint's axis and origin in world axes (7.85)."""
     R, p = state[0], state[1]
     if axis == 2:
         store_vector(s, row, (R[0][2], R[1][2], R[2][2]))
@@ -146,7 +146,10 @@ def write_jacobian_column(s, row, to, flags, g, c, reference, state):
 
 
 def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
-    """Differentiate a Jacobian column (7.126)."""
+    """Compute the time derivative of a Jacobian column (7.126).
+
+    For LOCAL, differentiate the components in the frame's moving axes.
+    """
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = load_vector(s, row)
     z_rate = eq.axis_rate(load_vector(s, row + 6), z)
@@ -166,7 +169,10 @@ def write_jacobian_rate_column(s, row, to, flags, g, c, reference, state):
 
 
 def _reference_point(reference, x):
-    """Return the reference point's position or velocity."""
+    """Return the position or velocity of the Jacobian's reference point.
+
+    `x` is the position or velocity of the frame's origin.
+    """
     if reference == _WORLD:
         nil = broadcast(0.0)
         x = nil, nil, nil
@@ -218,7 +224,9 @@ def write_hessian(m, s, program, place, pairs, b, reference, state, to):
 
 
 def _add_column_derivatives(s, program, i, first, end, reference):
-    """Add the derivatives of column i.
+    """Add the derivatives of column i with respect to each joint's motion.
+
+    The joint of column i counts as an earlier joint.
 
     | reference frame | an earlier joint moves | a later joint moves |
     |---|---|---|

@@ -42,7 +42,7 @@ class Geometry(IntEnum):
     """Columns of `CompiledTree.geometry`.
 
     Attributes:
-        OFFSET: Vector from the previous moving joint, in that joint's axes.
+        OFFSET: Vector from the previous moving joint to this joint, in the previous joint's axes.
     """
 
     R = 0
@@ -87,7 +87,7 @@ class CompiledTree:
     |---|---|---|
     | joints | | indices of the moving joints in the tree |
     | steps | (steps, 3) | integers of each moving joint; `StepField` names the columns |
-    | geometry | (steps, 14) | numbers of each moving joint; `Geometry` names the columns |
+    | geometry | (steps, 14) | numbers of each moving joint; `Geometry` names the first columns |
     | frames | (frames, 2) | last moving joint (row in `steps`, or -1), index in the output; sorted |
     | offsets | (frames, 12) | rotation and translation from the last moving joint, in the order of `frames` |
     | columns | (columns, 4) | integers of each Jacobian column; `ColumnField` names the columns |
@@ -96,8 +96,8 @@ class CompiledTree:
     | q_indices | | indices of the coordinates that the recursion needs |
     | parents | (steps,) | row of the previous moving joint; -1 for none |
     | lengths | (steps + frames,) | path lengths (m) to each moving joint, then to each row of `frames` |
-    | depth | (frames,) | number of joints from the root, in output order |
-    | tilts | (frames,) | sum of `Joint.tilt` (rad) from the root, in output order |
+    | depth | (frames,) | number of URDF joints from the root, in output order |
+    | tilts | (frames,) | sum of `Joint.tilt` (rad) over these URDF joints, in output order |
 
     `sum_columns`: joints with the same index in v share the column of the first joint on the path.
     `lengths`: a path begins at the previous moving joint or at the base. The length of a path is the sum of
@@ -134,7 +134,6 @@ class CompiledTree:
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether a number of the tree reaches `LARGE`."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
@@ -208,7 +207,7 @@ class _Anchor(NamedTuple):
     """A link's pose relative to the last moving joint.
 
     Attributes:
-        step: Row in `CompiledTree.steps`; -1 for none.
+        step: Row of this joint in `CompiledTree.steps`; -1 for none.
     """
 
     step: int
@@ -287,7 +286,7 @@ def _find_sum_columns(columns: IntArray, parents: Sequence[int], ends: Sequence[
 class Op(IntEnum):
     """Instructions of a program.
 
-    The special cases for X, Y and Z are faster.
+    The suffix X, Y or Z names a coordinate axis. Such instructions are faster.
     """
 
     END = 0
@@ -350,11 +349,9 @@ ANGLE_WIDTH = 4
 #: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers that describe one Jacobian column in a program that computes a Hessian.
-#: The first integer is the first scratch row of the column.
-#: The second integer is the row in `steps` of the joint to which the column belongs.
-#: The third integer is this joint's index in v.
-#: The fourth integer is the first scratch row of a sum of derivatives with respect to this joint's motion.
+#: Integers per Jacobian column in a program for a Hessian:
+#: first scratch row of the column, the joint's row in `steps`, the joint's index in v,
+#: and first scratch row of the sum of derivatives with respect to the joint.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -380,7 +377,7 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Addresses of `words` and `constants` while the program exists."""
+        """Addresses of `words` and `constants`, valid while the program exists."""
         return address(self.words), address(self.constants)
 
     @cached_property
@@ -394,7 +391,7 @@ def compile_program(
 ) -> KernelProgram:
     """Return the program for a tree's frames.
 
-    Results in frame axes need `orientations`.
+    Placements, and results in frame axes, need `orientations`.
     A Hessian needs separate columns for mimic joints.
     """
     key = orientations, columns, hessian
@@ -557,7 +554,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each matrix element."""
+        """Return the scratch row of each element of the (6, nv) matrix."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):
@@ -580,7 +577,7 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the first index of each needed block."""
+    """Return the first index of each block of eight that contains an index."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
@@ -608,7 +605,7 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: Address of the base's state (24 numbers); 0 for a fixed base.
+    #: Address of the base's state (24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
     #: Doubles from one configuration to the next;
     #: 0 if one row is for all configurations.

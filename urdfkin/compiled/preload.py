@@ -43,7 +43,7 @@ _SECONDS_SAVED = 5e-5
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two groups of kernels with about equal compile times.
+#: Two groups of kernels with about equal compile times, for two processes.
 _FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
 _SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -139,7 +139,7 @@ _background: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_in_background(name: str, module: str) -> bool:
-    """Return False if the caller must load the kernel."""
+    """Return False if the caller must load or compile the kernel."""
     if kernel_cache_folder() is None:
         return False
     if not compile_lock.acquire(blocking=False):
@@ -183,7 +183,10 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _close_inherited_inputs() -> None:
-    """Let the second process end with its parent."""
+    """Close a forked child's copy of the pipe to the second process.
+
+    The second process then ends with its parent.
+    """
     for process in _background.values():
         process.returncode = 0
         _close(process)
@@ -202,6 +205,7 @@ def all_kernels_on_disk() -> bool:
 
 
 def load_all_kernels() -> None:
+    """Load or compile the kernels of both groups before several processes start."""
     missing = kernel_cache_folder() is not None and not all(map(_is_on_disk, _SECOND_GROUP))
     compiler = _start_compiler(_SECOND_GROUP) if missing else None
     try:

@@ -46,10 +46,10 @@ class PreparedFrame:
     """Fast computation of one frame's quantities, such as the Jacobian.
 
     `Robot.prepare` creates the object. Results are exactly the same numbers as those of `Robot`. With
-    `verify=True`, urdfkin compares each result with Pinocchio's result. With `verify=False`,
-    `Robot.certificate` reports the results as unchecked. Contiguous float64 arrays are used directly. For
-    other arguments, `Robot` computes the result or raises the error. Several threads may share one object,
-    also on free-threaded Python.
+    `verify=True`, urdfkin compares each result with Pinocchio's result and uses the tolerance of `Robot`.
+    With `verify=False`, `Robot.certificate` reports the results as unchecked. Contiguous float64 arrays are
+    used directly. For other arguments, `Robot` computes the result or raises the error. Several threads may
+    share one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -92,7 +92,7 @@ class PreparedFrame:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
         #: Whether `Robot.prepare` created this object.
-        #: The first call loads or compiles machine code.
+        #: If so, the first call loads or compiles machine code.
         self.always_load = False
         # Each attribute first contains `_compute_first`.
         # `_compute_first` replaces this attribute by the fast function.

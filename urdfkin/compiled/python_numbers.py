@@ -11,14 +11,14 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: No result overflows if all inputs are below this bound.
+#: No result overflows if coordinates, velocities, lengths and multipliers are below this bound.
 #: N joints: joint velocity < LARGE^2, path length d < N LARGE^2,
 #: angular velocity w < N LARGE^2, largest product w^2 d < N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: Adding this constant rounds a number below 2^51 to an integer.
+#: Adding this constant rounds a number between -2^51 and 2^51 to an integer.
 #: The lowest bits of the sum's mantissa are this integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
@@ -47,7 +47,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return a fused multiply-add that never raises."""
+    """Return a fused multiply-add that gives inf or nan instead of an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -264,7 +264,7 @@ def is_in_range(total: Number) -> bool:
 
 
 def wait_for_writes(*_: object) -> None:
-    """Do nothing."""
+    """Do nothing. The compiled function waits until all results are in memory."""
 
 
 stream = wait_for_writes

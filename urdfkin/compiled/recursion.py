@@ -151,7 +151,7 @@ def rotate_frame(axes, state, S):
 def _rotate_about_z(axes, state, s, row):
     """Rotate the frame about z (7.5).
 
-    Scratch row `row` contains the sine, then the cosine.
+    Scratch row `row` contains the sine, row `row + 1` the cosine.
     """
     return rotate_frame(axes, state, eq.about_z(load_number(s, row), load_number(s, row + 1), zero(), one()))
 
@@ -194,7 +194,10 @@ def add_free_motion(axes, state, o, u, o_rate, u_rate):
 
 
 def _joint_coordinate(s, row, g, c, is_mimic):
-    """Round the mimic rule's product separately, as in Pinocchio."""
+    """Return a joint's coordinate.
+
+    The product and the sum of a mimic rule are rounded separately, as in Pinocchio.
+    """
     x = load_number(s, row)
     if is_mimic:
         x = round_product(load_constant(g, c) * x) + load_constant(g, c + 1)
@@ -298,7 +301,7 @@ def _restore_state(s, row, state):
 def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read whole blocks of eight numbers, which is faster.
 
-    No instruction uses the surplus numbers.
+    Later inputs overwrite the surplus numbers, or no instruction uses them.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -331,7 +334,7 @@ def _base_state(axes, m, s, args, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Run before the recursion, which needs all registers."""
+    """Compute all sines and cosines before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _joint_coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -452,6 +455,7 @@ def forward_recursion(address, axes, orders, mask, store, column, write):
     """Execute a program for every block of configurations.
 
     `orders` is 1 for q, 2 for q and v, 3 for q, v and a.
+    Return 1 for nan, inf or too large inputs, else 0.
     """
     args = integers_at(address)
     program, g, s = integers_at(args[_PROGRAM]), doubles_at(args[_CONSTANTS]), doubles_at(args[_SCRATCH])

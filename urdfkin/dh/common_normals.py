@@ -49,7 +49,10 @@ MAX_HAYATI_TILT = 0.35
 
 @dataclass(frozen=True, slots=True)
 class AxisTransform:
-    """Transform between two axes (m, rad); `phi_is_free` is true if the axes do not determine phi."""
+    """Numbers of the transform A between two joint axes (m, rad).
+
+    `phi_is_free`: the axes do not determine phi.
+    """
 
     phi: float = 0.0
     delta: float = 0.0
@@ -87,11 +90,12 @@ def find_axis_transform(
     offset_in_delta: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
-    """Factor the (4, 4) pose A of the next joint's frame in this joint's frame.
+    """Factor the transform A between two axes.
 
-    `reach` is the length of the path (m). If the axes do not determine phi, phi is `default_phi`. The offset
-    along parallel axes is in `delta` if `offset_in_delta` is true, otherwise in `delta_next`. Tilts and
-    lengths within `noise` are set to zero.
+    Tilts and lengths within `noise` become zero.
+    `default_phi` is used if the axes do not determine phi.
+    The offset along parallel axes becomes `delta_next`, or `delta` with `offset_in_delta`.
+    `reach` is the length of the path (m).
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_sine(A)
@@ -119,7 +123,6 @@ def _find_normal_transform(A: FloatArray, sine: float, reach: float, noise: Pose
 def _find_parallel_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float, offset_in_delta: bool
 ) -> AxisTransform:
-    """Return the transform between parallel axes, along a common normal through one joint's origin."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
     offset = clean_length(A[2, 3], reach, noise.metres)
@@ -133,10 +136,7 @@ def _find_parallel_transform(
 def find_hayati_transform(
     A: FloatArray, reach: float, noise: PoseTolerance, default_phi: float
 ) -> AxisTransform:
-    """Return the transform for a Hayati row.
-
-    The x axis points to the intersection of the next axis with the xy plane.
-    """
+    """The x axis points to the intersection of the next axis with the xy plane."""
     z = A[:3, 2]
     delta_next = clean_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -151,14 +151,16 @@ def find_hayati_transform(
 
 
 def _phi_next(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next (rad) of the pose A; the formula is accurate for every tilt."""
+    """Compute phi_next accurately for every tilt."""
     Rz = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (Rz @ link_transform(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
 def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
-    """Remove rounding errors from a length (m) that was computed from lengths of up to `reach`.
+    """Remove rounding errors from a length.
+
+    `reach` is the largest length in the computation (m).
 
     >>> clean_length(-5e-17, 1.0), clean_length(0.07599999999999998, 1.0), clean_length(-5e-12, 1.0)
     (0.0, 0.076, -5e-12)
@@ -171,9 +173,10 @@ def clean_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes of a path, and the first joint's row in a reference table.
+    """Two consecutive joint axes, and the first joint's row in a reference table.
 
     `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
+    The argument `delta_in` is the offset from the DH frame to the joint's frame (m).
     """
 
     A: FloatArray
@@ -188,7 +191,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether d of the row can be chosen freely; the next row can then compensate for d."""
+        """Whether the next row can compensate for d."""
         return tilt_sine(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
@@ -201,19 +204,20 @@ class PairWithReference:
 
     @property
     def normal_offset(self) -> float:
-        """Distance (m) along the first axis from the first joint's frame to the common normal."""
         return find_axis_transform(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
-        """Distance (m) along the first axis from the first joint's frame to the x axis of a Hayati row.
+        """Offset (m) along the first axis to the x axis of a Hayati row.
 
-        The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
-        Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
-        is the same as in the reference. If the tilt is small, the component in the tilt direction is
-        inaccurate. The theorem of Pythagoras then gives this component from the length a and the
-        perpendicular component of v. The result is None if the two axes are parallel in the path or in the
-        reference. The result is also None if the distance exceeds `reach`.
+        None: parallel axes in the path or in the reference, or |offset| > reach.
+
+            p: origin of the next joint's frame
+            t: unit vector along the projection of the next axis onto the xy plane
+            v: vector of length a along the row's x axis
+            v . t = value in the reference
+            offset = p_z + (v . t - p . t) cot(tilt)
+            small tilt: v . t is inaccurate;  |v . t| = sqrt(a^2 - |v x t|^2),  v x t = p x t
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_sine(self.A), math.hypot(along, across)
@@ -229,11 +233,7 @@ class PairWithReference:
         return offset if abs(offset) <= self.reach else None
 
     def find_transform(self, delta_in: float, d: float, default_phi: float = 0.0) -> AxisTransform:
-        """Return the transform between the two axes.
-
-        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` (m) is
-        the requested offset of the row. If the two axes determine the offset, `d` is ignored.
-        """
+        """Return the transform for the offset `d` (m); `d` is ignored if the axes determine the offset."""
         if not self.offset_is_free:
             A = shift_along_z(self.A, delta_in)
             return find_axis_transform(A, self.reach, default_phi, hayati=False, noise=self.noise)
@@ -245,24 +245,20 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, delta_next: float) -> float:
-        """Return the offset `delta_in` (m) for which d of the first joint's row is 0.
-
-        `delta_in` is the offset (m) along the first axis from the DH frame to the joint's frame. `delta_next`
-        is the offset (m) along the second axis from the next DH frame to the next joint's frame.
-        """
+        """Return the `delta_in` for which d is 0."""
         return float(delta_next * self.A[2, 2] - self.A[2, 3])
 
 
 def match_axis_transforms(
     pairs: Sequence[PairWithReference], phi_in: float, delta_in: float, tip_offset: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return for each pair of axes the transform, and theta in the row of the pair's first joint.
+    """Match the reference table's cells.
 
-    The free choices are made so that the cells are close to the cells of the reference table. `phi_in` is the
-    angle (rad) about the first axis from frame 0 to the first joint's frame. `delta_in` is the offset (m)
-    along the first axis between these frames. `tip_offset` is the offset (m) along the last axis from the DH
-    frame to the joint's frame. With this offset, d of the last row equals d of the reference table's last
-    row. If `tip_offset` is None, the two values of d may differ.
+    Rz(phi_in) Tz(delta_in) leads from frame 0 to the first joint.
+    `tip_offset` is the required `delta_in` of the last joint; None: any.
+
+    Returns:
+        The transforms, and theta of each pair's first joint.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -283,11 +279,9 @@ def match_axis_transforms(
 def _choose_offset(
     pairs: Sequence[PairWithReference], i: int, delta_in: float, tip_offset: float | None
 ) -> float:
-    """Return the cell d of row i.
+    """Choose d of row i.
 
-    Usually, the result is the reference table's cell d of row i. In row 0 and in the row of a prismatic
-    joint, d may be free. Then d can be chosen such that another cell equals the reference table's cell. This
-    is the cell d of a later row, or the cell a of a Hayati row.
+    A free d is chosen so that another cell equals the reference.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -317,11 +311,7 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return an angle phi for row i, where phi can be chosen freely.
-
-    Usually, phi makes the cell theta of row i equal to the reference table's cell. If rows of prismatic
-    joints follow, phi can instead make the cells theta of these rows equal to the reference table's cells.
-    """
+    """Choose phi to match theta of row i, or of the following prismatic joints."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -338,7 +328,6 @@ def _choose_phi(
 
 
 def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
-    """Choose the direction of x that gives cells closer to the reference."""
     row = pair.row
 
     def difference(step: AxisTransform) -> tuple[float, float]:
@@ -350,7 +339,6 @@ def _choose_direction(step: AxisTransform, pair: PairWithReference, phi_in: floa
 
 
 def match_theta(theta: float, reference: float) -> float:
-    """Return `reference` if the two angles differ only by rounding. Otherwise, return `theta`."""
     return (
         reference if abs(angle_difference(theta, reference)) <= ANGLE_ROUNDINGS * EPS else clean_angle(theta)
     )
@@ -387,18 +375,19 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Angles up to `radians` and lengths up to `metres` in a constant pose are treated as rounding errors."""
+    """Angles and lengths of a constant pose up to these values count as rounding errors."""
 
     radians: float
     metres: float
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the tolerance for rounding errors in a constant pose.
+    """Bound the rounding errors of a constant pose.
 
-    The constant pose is a product of joint origin transforms. `joints` is the number of these transforms.
-    `length` (m) is the sum of the lengths of the transforms' translations. `reach` (m) is the length of the
-    whole path. The tolerance covers angles that a program rounded to fifteen digits.
+    The pose is a product of `joints` joint origins.
+    `length` is the sum of the lengths of their translations (m).
+    `reach` is the length of the whole path (m).
+    The bound covers angles rounded to fifteen digits.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
@@ -418,10 +407,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def sum_zeroed_tilts(chain: FrameChain) -> float:
-    """Return the sum (rad) of all tilts that a table replaces by zero, because they are rounding errors.
-
-    The orientation error that these tilts cause is at most this sum.
-    """
+    """Bound the orientation error (rad) from tilts set to zero."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_sine(A), abs(float(A[2, 0]))) if tilt <= noise.radians)
@@ -429,5 +415,4 @@ def sum_zeroed_tilts(chain: FrameChain) -> float:
 
 
 def tilt_sine(A: FloatArray) -> float:
-    """Return the sine of the angle between the z axis of a pose and the z axis of its reference frame."""
     return math.hypot(A[0, 2], A[1, 2])

@@ -51,16 +51,15 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=target, rows=rows, base=base, tool=tool)
 
 
+#: Limits for a prismatic joint without limits (m, m/s and N).
 #: URDF requires limits for prismatic joints.
-#: Limits of a prismatic joint without limits (m, m/s and N).
 DEFAULT_PRISMATIC_LIMIT = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
-    """Return the table's robot as a tree from the base frame to the tip.
+    """Return the table as a tree.
 
-    A mimicked joint without a row becomes a separate joint on the base, so that the tree has the same
-    coordinates as the table. A revolute joint without limits becomes continuous.
+    A mimicked joint without a row becomes a joint on the base.
     """
     links = link_names(table)
     joints = _serial_joints(table, [(_tree_kind(row), _tree_limit(row), row.mimic) for row in table.rows])
@@ -82,22 +81,19 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF of the tree from `to_tree`, without shapes and masses."""
+    """Return the robot's URDF without shapes and masses."""
     return write_urdf(to_tree(table))
 
 
 def to_free_tree(table: DHTable) -> KinematicTree:
-    """Convert a table to a kinematic tree without joint limits and mimic rules.
-
-    The tree has one coordinate for each row, in row order.
-    """
+    """Return a tree without joint limits and mimic rules, with one coordinate per row."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return make_serial_tree(table.robot, link_names(table), joints)
 
 
 def make_serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> KinematicTree:
-    """Return a tree without branches; joint i connects links i and i + 1."""
+    """Connect links i and i + 1 by joint i."""
     return build_tree(robot, links[0], list(zip(joints, links, links[1:], strict=False)))
 
 
@@ -114,9 +110,9 @@ def _serial_joints(
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the pose of each joint frame in the previous frame, and the pose of the tip in the last frame.
+    """Return each frame's pose in the previous frame.
 
-    All joints are at zero.
+    The last frame is the tip. All joints are at zero.
     """
     if not table.rows:
         return [table.base @ table.tool]

@@ -41,7 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance of a right angle, rad; 1.571 is a right angle.
+#: Tolerance of a right angle, rad; 1.571 counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {
@@ -56,7 +56,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class DerivationOptions:
-    """Options for the derivation of a table; `urdfkin.dh.make.make_dh_table` explains each option."""
+    """Options of `urdfkin.dh.make.make_dh_table`."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -79,11 +79,11 @@ class DerivationOptions:
 
 
 def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None = None) -> DHTable:
-    """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
+    """Derive a table from a chain.
 
-    `like` is a standard table of the same joints. The result copies from `like` the directions of the x axes,
-    and the offsets d along parallel axes. With `like`, `options.sign` has no effect, and
-    `options.parallel_offset` has an effect only if its value is "first".
+    `like` is a standard table of the same joints.
+    With `like`, `options.sign` has no effect.
+    `options.parallel_offset` then has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -146,7 +146,6 @@ def _make_table(
 
 
 def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Reverse the z axis of each joint in `flip`, and return the new constant poses of the chain."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -159,7 +158,7 @@ def _reverse_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], options: DerivationOptions, reach: float
 ) -> None:
-    """Shift the axes of prismatic joints. A prismatic joint defines only the direction of its axis."""
+    """A prismatic joint determines only the direction of its axis, so the axis can be shifted."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -179,7 +178,6 @@ def _place_prismatic_axes(
 
 
 def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: list[bool]) -> bool:
-    """Shift the axis of joint k to the origin of a neighbouring revolute joint, if there is one."""
     if k + 1 < len(is_prismatic) and not is_prismatic[k + 1]:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -190,10 +188,7 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the axis of prismatic joint k to the origin of a neighbouring joint with a nearly parallel axis.
-
-    Without the shift, the common normal of the two axes may be far away from the robot.
-    """
+    """Shift a nearly parallel axis, to avoid a common normal far away from the robot."""
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -209,7 +204,7 @@ def _shift_to_previous_origin(constants: list[FloatArray], k: int) -> None:
 
 
 def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Shift the frame of joint k by `offset`, a vector with components in this frame."""
+    """`offset` is a vector in the frame of joint k."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -218,7 +213,11 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 
 
 def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and the offset along z_0 from frame 0 to joint 1."""
+    """Find frame 0.
+
+    Returns:
+        T_base_0, and the angle about and offset along z_0 to joint 1.
+    """
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
@@ -296,9 +295,9 @@ def _has_no_tool(table: DHTable) -> bool:
 def _match_first_row(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta of the first row from `like`, and change the base to compensate.
+    """Copy theta from the reference, and adjust the base.
 
-    If the first row of `like` has d = 0, the base also compensates for d, and the result has d = 0.
+    If the reference has d = 0, d becomes 0.
     """
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
@@ -311,11 +310,10 @@ def _match_first_row(
 def _match_last_row(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a and alpha of the last row from `like`, and change the tool to compensate.
+    """Copy theta, a and alpha from the reference, and adjust the tool.
 
-    If the last row of `like` has d = 0, the tool also compensates for d, and the result has d = 0. Nothing is
-    copied if neither table has a tool and the two angles theta are nearly equal. Then only a rounding error
-    of theta is removed.
+    If the reference has d = 0, d becomes 0.
+    Nothing is copied if neither table has a tool and theta nearly agrees.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
@@ -338,9 +336,10 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _fits_last_row(A: FloatArray, options: DerivationOptions, noise: PoseTolerance) -> bool:
-    """Whether the last row can contain the transform A, so that the table needs no tool.
+    """Whether the last row can contain A, so that the table needs no tool.
 
-    A standard table ends with Rz Tz Tx Rx, and a modified table ends with Rz Tz.
+    standard   A = Rz Tz Tx Rx
+    modified   A = Rz Tz
     """
     if options.last == "flange":
         return False
@@ -359,11 +358,7 @@ def _make_last_row(
     options: DerivationOptions,
     noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Return theta and d of the last row, the transform with a and alpha of the last row, and the tool.
-
-    `A` is the tip's pose in a frame with the origin O_{n-1}. The axes of this frame are parallel to the axes
-    of the last joint's frame.
-    """
+    """`A` is the tip's pose in a frame with origin O_{n-1} and the last joint's axes."""
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = clean_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)

@@ -34,10 +34,7 @@ _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
 def derive_matching_table(chain: FrameChain, options: DerivationOptions, reference: DHTable) -> DHTable:
-    """Return the table of a chain. The reference table determines the free choices of the frames.
-
-    `options.flip` must be the result of `find_reversed_joints`.
-    """
+    """`options.flip` must be the result of `find_reversed_joints`."""
     standard = replace(options, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), options.convention)
 
@@ -45,7 +42,6 @@ def derive_matching_table(chain: FrameChain, options: DerivationOptions, referen
 def find_reversed_joints(
     chain: FrameChain, options: DerivationOptions, reference: DHTable
 ) -> tuple[str, ...]:
-    """Return the joints with opposite positive directions in the reference table and in the URDF."""
     check_joints(chain, reference)
     standard = to_convention(reference, "standard")
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
@@ -73,7 +69,7 @@ def find_reversed_joints(
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key for sorting tables; the table that is closest to the reference has the smallest key."""
+    """Return a sort key, smallest for the closest table."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
@@ -112,51 +108,42 @@ def make_dh_table(
     slide: str = "drawn",
     like: DHTable | None = None,
 ) -> DHTable:
-    """Return the Denavit-Hartenberg table of the path between two frames of a robot.
+    """Return the Denavit-Hartenberg table of the path between two frames.
 
-    If `snap` is 0, the table gives the URDF's tip pose up to rounding errors.
+    If `snap` is 0, the table is exact up to rounding errors.
 
     Args:
         tree: The robot.
-        tip: Name of a link or joint frame.
-        base: Name of a link or joint frame; the root link when None.
-        convention: "standard" (distal, as in the textbook) or "modified" (proximal, as in Craig's book).
-        near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
-            parameters, and may give offsets of kilometres.
-        snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
-            degrees becomes that multiple. The table's attribute `snap` reports the effect. If `snap` is 0,
-            no angle is changed.
-        last: "tip": the last row ends at the tip if four parameters suffice for this. "flange": the tool
-            contains the transform from the last axis to the tip.
-        parallel_offset: Rule for the offsets d along consecutive parallel axes. "last": the last row of these
-            axes contains the sum of the offsets. "first": the first row of these axes contains the sum.
-            "each": every row contains the offset of its own link.
-        flip: Names of joints whose positive direction is reversed. In the rows of these joints, `sense` is
-            -1.
-        first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
-            axis. "joint": the base contains the transform to the first axis, and d_1 and theta_1 are zero
-            (Craig's frame 0).
-        sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
-            negative. "alpha": the cell alpha is not negative.
-        slide: Rule for the position of a prismatic joint's axis, because a prismatic joint defines only the
-            direction of its axis. "drawn": the axis passes through the joint's origin in the URDF. This axis
-            is shifted if the shift avoids a tool, a translation of the base or a distant common normal.
-            "minimal": the axis passes through the origin of the next joint if that joint is revolute.
-            Otherwise, the axis passes through the origin of the previous joint if that joint is revolute. The
-            cell a between these two axes is then 0. Without a revolute neighbour, the rule "drawn" applies.
-        like: A published table. The result copies the positive joint directions and the directions of the x
-            axes from this table. The result also copies the offsets d along parallel axes, and the zero
-            positions of the first and the last joint. All other numbers come from the URDF. With `like`, the
-            arguments `last`, `parallel_offset`, `flip`, `first` and `sign` must have their default values.
+        tip: A link or joint frame.
+        base: A link or joint frame; None: the root.
+        convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+        near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
+            four parameters, and offsets may be kilometres.
+        snap: Largest change (rad) of an angle that becomes a multiple of 15 degrees. The table's attribute
+            `snap` reports the effect.
+        last: "tip": the last row ends at the tip if possible. "flange": the tool leads from the last axis
+            to the tip.
+        parallel_offset: Row with the offset d of consecutive parallel axes. "last": the last row has the
+            sum. "first": the first row has the sum. "each": each row has the offset of its link.
+        flip: Joints whose positive direction is reversed (`sense` is -1).
+        first: "base": d_1 and theta_1 lead to the first axis, if possible. "joint": the base leads to the
+            first axis, and d_1 and theta_1 are 0 (Craig's frame 0).
+        sign: Direction of x. "theta": |theta| <= pi/2. "a": a >= 0. "alpha": alpha >= 0.
+        slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
+            The axis is shifted if this avoids a tool, a base translation or a distant common normal.
+            "minimal": the axis passes through the origin of a neighbouring revolute joint, so a is 0. The
+            next joint has priority. Without such a joint, "drawn" applies.
+        like: A published table. The result copies joint directions, x axes and offsets d along parallel axes.
+            The zeros of the first and last joints are copied too. All other numbers come from the URDF. The
+            options `last`, `parallel_offset`, `flip`, `first` and `sign` must then have default values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
-        InputError: an option has an invalid value, `like` is combined with an option that must have its
-            default value, or the path contains a planar or floating joint.
-        RangeError: the square of a length is outside the range of doubles.
+        InputError: an option is invalid or excluded by `like`, or a joint is planar or floating.
+        RangeError: the square of a length overflows.
     """
     exact = make_chain(tree, tip, base)
-    # Pinocchio's poses are relative to the root.
+    # Pinocchio computes poses from the root, so the whole path is checked.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]

@@ -31,9 +31,13 @@ def _compile_table(table: DHTable) -> CompiledTree:
 def jacobian(
     table: DHTable, q: ConfigurationLike, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (equation 7.85).
+    """Return the tip's Jacobian (equation 7.85).
 
-    `q` (..., coordinates) is in the order of `joint_names` (rad or m). The world is the table's base frame.
+    The world is the table's base frame.
+    `q` (..., coordinates) is in the order of `joint_names` (rad or m).
+
+    Returns:
+        (..., 6, coordinates), [linear; angular].
     """
     shape, (values,) = _flatten(table, table.coupling.values(q))
     J = jacobians(_compile_table(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
@@ -46,9 +50,12 @@ def velocity(
     v: ConfigurationLike,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
-    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128).
+    """Return the tip's velocity (equations 7.127, 7.128).
 
     `v` is in rad/s or m/s.
+
+    Returns:
+        (..., 6), [linear; angular].
     """
     shape, (values, rates) = _flatten(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(_compile_table(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
@@ -61,9 +68,12 @@ def acceleration(
     a: ConfigurationLike,
     reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED,
 ) -> FloatArray:
-    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130).
+    """Return the tip's classical acceleration (equations 7.129, 7.130).
 
     `a` is in rad/s^2 or m/s^2.
+
+    Returns:
+        (..., 6), [linear; angular].
     """
     arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
     shape, (values, velocities_, accelerations_) = _flatten(table, *arrays)
@@ -78,7 +88,11 @@ def _joint_derivatives(table: DHTable, rates: ConfigurationLike, what: str) -> F
 
 
 def _flatten(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Return the common batch shape, and the broadcast arrays with shape (n, rows)."""
+    """Flatten the batch axes.
+
+    Returns:
+        The common batch shape, and arrays (n, rows).
+    """
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     flat = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

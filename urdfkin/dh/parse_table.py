@@ -66,9 +66,10 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
-    """Find the table in a text, and return the table as plain data.
+    """Find a table in a text.
 
-    Raise InputError if the text has no valid table.
+    Returns:
+        Plain data for `table_from_mapping`.
     """
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_parse_latex, _parse_bars, _parse_separated, _parse_aligned):
@@ -96,9 +97,11 @@ def find_table_in_text(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table in text; `name` is "" for an unknown heading.
+    """A column of a table.
 
-    `previous` is true if the heading has the index i-1, as in modified tables.
+    Attributes:
+        name: Known name, otherwise "".
+        previous: Whether the heading has the index i-1.
     """
 
     name: str
@@ -109,9 +112,11 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The cells of a table in a text; `other_lines` contains all lines outside the table.
+    """The cells of a table.
 
-    If `strict` is true, an unknown column is an error.
+    Attributes:
+        other_lines: Lines outside the table.
+        strict: Whether an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
@@ -125,7 +130,6 @@ class _Grid:
 
 
 def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: str = "") -> _Grid | None:
-    """Find the first line of headings, and the rows below it up to the end of the table."""
     for k, line in enumerate(lines):
         columns = _parse_columns(split(line))
         if columns is None:
@@ -193,7 +197,6 @@ def _parse_latex(lines: list[str]) -> _Grid | None:
 
 
 def _parse_bars(lines: list[str]) -> _Grid | None:
-    """Parse cells that are separated by | or by vertical box-drawing characters."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
     plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown escapes brackets: a \[m\].
 
@@ -204,7 +207,7 @@ def _parse_bars(lines: list[str]) -> _Grid | None:
 
 
 def _parse_separated(lines: list[str]) -> _Grid | None:
-    """Parse CSV; if semicolons or tabs separate the cells, a comma in a cell is a decimal comma."""
+    """Parse cells separated by semicolons, tabs or commas."""
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
     grids = (
         _find_grid(lines, partial(_split_csv_line, separator=separator), separator)
@@ -218,7 +221,7 @@ def _split_csv_line(line: str, separator: str) -> list[str]:
 
 
 def _parse_aligned(lines: list[str]) -> _Grid | None:
-    """Parse cells that are separated by two or more blanks, or by one blank if no cell contains blanks."""
+    """Parse cells separated by two or more blanks, otherwise by one."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -231,7 +234,7 @@ def _parse_aligned(lines: list[str]) -> _Grid | None:
 
 
 def _parse_columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Parse a line of headings; return None if a, alpha, d or theta is missing."""
+    """Return None if a required column is missing."""
     columns = tuple(map(_parse_column, cells))
     names = [column.name for column in columns]
     if any(name not in names for name in COLUMNS):
@@ -274,10 +277,10 @@ def _parse_settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any
 
 
 def _find_convention(grid: _Grid) -> str | None:
-    """Find the convention of a table in the headings or in the text around the table.
+    """Find the convention.
 
-    Headings with the index i-1 show the modified convention. Otherwise, the text around the table may name
-    the convention. Return None if the text names no convention, or both conventions.
+    Returns:
+        None if the text names no convention or both.
     """
     if any(column.previous for column in grid.columns):
         return "modified"
@@ -287,7 +290,7 @@ def _find_convention(grid: _Grid) -> str | None:
 
 
 def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
-    """Parse a pose as urdfkin prints it: three rows under `base (metres):`, or a LaTeX matrix."""
+    """Parse a pose printed by urdfkin, as text or as a LaTeX matrix."""
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
         return _nearest_rigid(
@@ -302,7 +305,7 @@ def _parse_pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace a rotation matrix of rounded numbers by the nearest exact rotation matrix."""
+    """Replace a rounded rotation by the nearest rotation matrix."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -313,7 +316,7 @@ def _nearest_rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _parse_coordinate_names(lines: list[str]) -> list[str]:
-    """Parse the joint names in a line such as `with q1 = left, q2 = right`."""
+    """Parse a line such as `with q1 = left, q2 = right`."""
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescape(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
@@ -341,7 +344,6 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _add_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
-    """Return the plain text of a cell. If a nonzero number has no unit, add the unit of the column."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", original) if decimal_commas else original
     try:
         cell = parse_cell(text)
@@ -358,15 +360,11 @@ def _add_unit(original: str, column: _Column, where: str, decimal_commas: bool) 
 
 
 def _unescape(name: str) -> str:
-    r"""Remove the escapes of Markdown and LaTeX from a name: `a\_b` becomes a_b."""
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
 def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
-    """Move the cells of the mimic rule into the mapping `mimic`, and the cells of the limits into `limit`.
-
-    If the row has no mimic rule, the cell `offset` is added to theta or d.
-    """
+    """Without a mimic rule, add the offset to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("mimicked_joint", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
@@ -378,10 +376,9 @@ def _nest_row(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
-    """Replace the variable of another joint, such as q1 in row 2, by a mimic rule.
+    """Replace another joint's variable by a mimic rule.
 
-    The i-th name in `coordinates` is the joint with the variable qi. If `coordinates` is empty, qi is the
-    variable of row i.
+    Variable qi is the i-th name in `coordinates`; without names, the joint of row i.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -415,10 +412,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table file.
-
-    A .txt file that begins with "<" is a URDF, and not a table.
-    """
+    """Whether a source is a table file; a .txt file that begins with "<" is a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:
@@ -431,8 +425,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
     Raises:
         SourceError: the file cannot be read.
-        InputError: the file has another suffix or invalid syntax, or `table_from_mapping` raises an error.
-            The message contains the file's name.
+        InputError: the suffix, the syntax or the table is invalid.
 
     >>> import urdfkin
     >>> table = urdfkin.read_table("robots/dh/ur5.toml")
@@ -443,10 +436,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or read screws if the file contains the key M.
-
-    The function raises the same errors as `read_table`.
-    """
+    """A file with the key M contains screws."""
     data = read_mapping(path)
     return (
         _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))
@@ -512,12 +502,11 @@ _PARSERS: dict[str, Callable[[str], Any]] = {
 
 
 def published_tables() -> dict[str, Path]:
-    """Return a mapping from the name of each published table in urdfkin to the table's file."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
 def suggest_published_tables(robot: str) -> list[str]:
-    """Return a line with the option `--like` for each published table of a robot."""
+    """Recommend published tables of a robot."""
     lines = []
     for name, path in published_tables().items():
         data = read_mapping(path)
@@ -528,7 +517,7 @@ def suggest_published_tables(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """Return the path of a table file, given as a path or as the name of a published table."""
+    """`name` is a path or a published table's name."""
     path = Path(name)
     if path.suffix or exists(path):
         return path

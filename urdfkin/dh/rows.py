@@ -74,9 +74,9 @@ class NumberWithText(float):
 
 
 def half_digits_by_row(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of the last digit of each cell (metres or radians), for each row.
+    """Return half a unit of each cell's last digit (m or rad), by row.
 
-    `data` must come from `urdfkin.dh.parse_table.mapping_from_text`, which keeps the text of the numbers.
+    `data` must be a result of `urdfkin.dh.parse_table.mapping_from_text`.
     """
     units = parse_units(data.get("angles", "radians"), data.get("lengths", "metres"))
     rows = []
@@ -93,9 +93,9 @@ def _half_digit_in_si(name: str, value: object, units: Units) -> float:
 
 
 def half_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of a written number's last digit; 0 if the number is exact.
+    """Return half a unit of a number's last digit; 0 for an exact number.
 
-    A whole number is exact unless `whole_is_rounded`: 425 mm is uncertain by 0.5 mm, and 90 deg is exact.
+    A whole number is exact unless `whole_is_rounded`.
 
     >>> half_digit(NumberWithText("0.3111")), half_digit("90"), half_digit(425, True), half_digit("pi")
     (5e-05, 0.0, 0.5, 0.0)
@@ -117,7 +117,7 @@ def name_cells(row: Sequence[Any]) -> dict[str, Any]:
 
 
 def parse_row(row: Any, index: int, units: Units) -> DHRow:
-    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list; `index` counts from 0."""
+    """Parse a handwritten row; `index` begins at 0."""
     if isinstance(row, DHRow):
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
@@ -137,9 +137,10 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def _check_order(rows: Sequence[Any]) -> None:
-    """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
+    """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    Nearly all angles in tables are multiples of 15 degrees. A length is rarely a multiple of 15 or of pi/12.
+    Angles are usually multiples of 15 degrees.
+    Lengths are rarely multiples of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):
@@ -206,9 +207,9 @@ def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str 
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Remove the joint's variable from a cell, so that the cell contains only a constant.
+    """Remove the joint's variable from a cell.
 
-    For example, the cell "q3 + pi" becomes the number pi. The result also has the keys `kind` and `sense`.
+    The variable determines `kind` and `sense`.
     """
     texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
     cells = {name: _parse_cell_text(text, f"{where}, {name}") for name, text in texts.items()}
@@ -362,21 +363,20 @@ def table_from_rows(
     """Make a table from handwritten rows.
 
     Args:
-        rows: The rows. Each row is a `DHRow`, a mapping with the row's fields, or a list. A `DHRow` is always
-            in metres and radians. A list is [a, alpha, d, theta] with an optional "R" or "P" at the end.
+        rows: The rows: each is a `DHRow`, a mapping or a list. A `DHRow` is always in metres and radians. A
+            list is [a, alpha, d, theta], optionally with "R" or "P" at the end.
         convention: "standard" or "modified".
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".
-        base: (4, 4) or (3, 4) T_base_0, with positions in the unit `lengths`; the identity when None.
-        tool: (4, 4) or (3, 4) T_n_tip, with positions in the unit `lengths`; the identity when None.
+        base: (4, 4) or (3, 4) T_base_0, in the unit `lengths`; None: the identity.
+        tool: (4, 4) or (3, 4) T_n_tip, in the unit `lengths`; None: the identity.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        coordinates: Names of mimicked joints that have no row because they are not on the path.
+        coordinates: Names of mimicked joints without a row.
 
     Raises:
-        InputError: the convention or a unit is unknown, a row is invalid, there are no rows, or one joint has
-            two rows.
+        InputError: a unit, the convention or a row is invalid, rows are missing, or a joint has two rows.
         UnknownNameError: a mimicked joint has no row and is not in `coordinates`.
 
     Example:
@@ -410,9 +410,9 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping that has the keys of a TOML file.
+    """Make a table from a mapping.
 
-    The docstring of the module `urdfkin.dh.rows` shows the keys.
+    The module's docstring shows the keys.
     """
     if "convention" not in data:
         raise InputError(

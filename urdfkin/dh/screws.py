@@ -42,10 +42,9 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws and of M.
-#: Tolerance of the length of an axis vector.
-#: Tolerance of the pitch of a screw, m/rad.
-#: Tolerance of the entries of R R^T - I, R the rotation in M.
+#: Tolerance of handwritten screws and of M, for three numbers:
+#: difference of an axis vector's length from 1; pitch of a screw, m/rad;
+#: entries of R R^T - I, where R is the rotation in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -60,13 +59,13 @@ class ScrewJoint:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ProductOfExponentials(Displayable):
-    """A robot's path as a product of exponentials; `print` and notebooks show the product as tables.
+    """A path as a product of exponentials, printed as tables.
 
     Attributes:
         joints: The joints, base to tip.
-        M: (4, 4) pose of the tip in the base frame in the zero configuration (metres).
-        space: (n, 6) screws (w, v) in the base frame. For a revolute joint, w is in rad/rad and v in m/rad.
-            For a prismatic joint, w is 0 and v is in m/m.
+        M: (4, 4) pose of the tip in the base frame, in the zero configuration (metres).
+        space: (n, 6) screws (w, v) in the base frame. Revolute: w in rad/rad, v in m/rad. Prismatic: w = 0,
+            v in m/m.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
@@ -106,7 +105,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the path's coordinates to the values of the path's joints.
+        """The map from coordinates to joint values.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names
@@ -116,7 +115,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def points(self) -> FloatArray:
-        """(n, 3) point of each revolute axis that is nearest to the base's origin.
+        """(n, 3) point of each revolute axis nearest to the base's origin.
 
         A prismatic joint has the point of the previous joint.
 
@@ -131,9 +130,10 @@ class ProductOfExponentials(Displayable):
         return np.array(found).reshape(-1, 3)
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return the (..., 4, 4) pose of the tip in the base for `q` (..., coordinates).
+        """Return the (..., 4, 4) pose of the tip in the base frame.
 
-        The coordinates are in the order of `coupling.names`.
+        Args:
+            q: (..., coordinates) in the order of `coupling.names`.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -146,11 +146,13 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The product of exponentials, written as rotations about z axes and translations along z axes.
+        """The product as rotations about z axes and translations along z axes.
 
-        For a revolute joint, exp([S] q) = A Rz(q) A^-1. For a prismatic joint, exp([S] q) = A Tz(q) A^-1. The
-        z axis of the pose A is along the joint's axis. The constant pose between two motions is A_i^-1
-        A_{i+1}. The last constant pose is A_n^-1 M.
+            revolute             exp([S] q) = A Rz(q) A^-1
+            prismatic            exp([S] q) = A Tz(q) A^-1
+            z axis of A          along the joint's axis
+            constant poses       A_i^-1 A_{i+1}
+            last constant pose   A_n^-1 M
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()
@@ -165,10 +167,9 @@ class ProductOfExponentials(Displayable):
 
     @property
     def roundings(self) -> float:
-        """Bound of the rotation error that rounding causes in `placement`, in units of the machine epsilon.
+        """Bound of the rotation's rounding error in `placement`, in units of eps.
 
-        The bound is twice the bound for a Denavit-Hartenberg table of the same path. The bound does not
-        contain the effect of rounding in q.
+        The bound is twice that of a Denavit-Hartenberg table of the path. Rounding of q is not included.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
@@ -177,7 +178,7 @@ class ProductOfExponentials(Displayable):
         return 2.0 * table_roundings(len(self.joints))
 
     def rounding(self, q: ConfigurationLike) -> FloatArray:
-        """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.
+        """Return a bound (...,) of the rounding error of the position (metres).
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").screws("tip", "base").rounding([0.0, 0.0]) < 1e-13)
@@ -193,8 +194,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        In the zero configuration, each link frame is parallel to the base frame. The origin of each link
-        frame is on the axis of the link's joint.
+        In the zero configuration, each link frame is parallel to the base frame.
+        The frame's origin is on the axis of the link's joint.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
@@ -213,7 +214,7 @@ class ProductOfExponentials(Displayable):
         return make_serial_tree(self.robot, links, joints)
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return the screws as plain data for `screws_from_mapping`, without mimic rules and limits.
+        """Return plain data for `screws_from_mapping`, without mimic rules and limits.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").as_mapping()["joints"]
@@ -255,7 +256,7 @@ def make_screws(path: FrameChain) -> ProductOfExponentials:
 
 
 def _nearest_rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to M. The numbers in M may be rounded. An exact M is unchanged."""
+    """Return the rigid transform nearest to M; an exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -277,12 +278,19 @@ def screws_from_rows(
     base_frame: str = "base",
     tip_frame: str = "tip",
 ) -> ProductOfExponentials:
-    """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
+    """Make a product of exponentials from handwritten screws.
 
-    `screws` has the shape (n, 6), with a row (w, v) for each joint. The shape (6, n) of Modern Robotics, with
-    a column for each joint, is accepted if n is not 6. `M` is the (4, 4) or (3, 4) pose of the tip in the
-    zero configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
-    screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
+    A joint is revolute if w is not 0, otherwise prismatic.
+    URDF has no joint with a pitch, so w . v must be 0.
+
+    Args:
+        screws: (n, 6) rows (w, v); also (6, n) if n is not 6.
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration, m.
+        frame: Frame of the screws: "space" (base) or "body" (tip).
+        joints: Joint names.
+        robot: The robot's name.
+        base_frame: The base frame's name.
+        tip_frame: The tip frame's name.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
@@ -330,7 +338,7 @@ def screws_from_rows(
 
 
 def screws_from_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from plain data with the keys M and "space" or "body"."""
+    """Make screws from plain data."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     check_keys([key for key in data if key != "lock"], known, "the table of screws")
     frame = next((key for key in ("space", "body") if key in data), None)

@@ -37,7 +37,8 @@ from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
-#: Above 7.5 degrees, two multiples of 15 degrees would be possible.
+#: Largest permitted tolerance, rad.
+#: Above 7.5 degrees, an angle could become either of two multiples of 15 degrees.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
 #: Assumed range of mimicked joints outside the path, rad or metres.
@@ -59,9 +60,10 @@ def check_snap_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles, and the changes.
+    """Return the chain with snapped angles.
 
-    Each change is paired with the index k of the changed constant pose A_k.
+    Returns:
+        The chain, and (k, change) for constant pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
@@ -81,7 +83,6 @@ def snap_chain(
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
-    """Snap theta of each row; a change of theta turns the rest of the chain about the row's axis."""
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
         theta = wrap_angle(nearest_twelfth(row.theta)) + 0.0
@@ -127,7 +128,10 @@ def sample_within_limits(table: DHTable) -> FloatArray:
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
-    """Return the (...,) angles (rad) between rotations (..., 3, 3): |R - S| = 2 sqrt2 sin(angle / 2)."""
+    """Return the angles (rad) between rotations (..., 3, 3).
+
+    |R - S| = 2 sqrt2 sin(angle / 2)
+    """
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
 
@@ -136,7 +140,6 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 
 
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
-    """Snap roll, pitch and yaw of all joint origins; return the tree and the rotation of each origin."""
     joints, rotations = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
         T = np.array(joint.T_parent_joint)
@@ -150,7 +153,7 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
 
 
 def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
-    """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
+    """Snap the angles of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
     # Gimbal lock determines only roll + yaw or roll - yaw, so roll is 0.
@@ -162,10 +165,10 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Write a pose's rotation as Rz(phi) Rx(tilt) Rz(psi), and snap phi, tilt and psi.
+    """Snap the angles of Rz(phi) Rx(tilt) Rz(psi).
 
-    Return the new pose, and the angle (rad) between the old and the new rotation. The angle
-    is 0 if the rotations differ only by rounding.
+    Returns:
+        The new pose, and the angle from the old to the new rotation (rad).
     """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
@@ -184,10 +187,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Snap the angles of rotations about coordinate axes, and multiply the rotations.
-
-    `tolerance` (rad) is the largest change of an angle.
-    """
+    """Snap each rotation's angle."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
@@ -205,10 +205,6 @@ def _multiply_rotations(turns: Sequence[tuple[int, float]], tolerance: float) ->
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a `SnapChange` for each snapped joint origin.
-
-    The `lever` of a change is the path length (m) from the joint origin to the tip.
-    """
     changes, lever, prismatic_joints = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -227,15 +223,15 @@ def _changes_of_origins(
 
 
 def _make_change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return a `SnapChange` that rotates the chain after joint k (from 1) about the joint's origin."""
+    """The change rotates the chain after joint k (from 1) about the joint's origin."""
     prismatic_joints = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), prismatic_joints)
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the index of the row that contains the chain's constant pose A_k.
+    """Return the row that contains A_k.
 
-    The index -1 means the base, and the index n means the tool.
+    The base is row -1, and the tool is row n.
     """
     n = len(table.rows)
     if k == 0:
@@ -246,7 +242,11 @@ def row_of_constant(table: DHTable, k: int) -> int:
 
 
 def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return (joint, cell, deviation) for angles near multiples of 15 degrees, and lengths near 0."""
+    """Find angles near multiples of 15 degrees, and lengths near 0.
+
+    Returns:
+        (joint, cell, deviation) tuples.
+    """
     noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
@@ -260,11 +260,7 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, make_snapped_table: Callable[[float], DHTable]) -> str | None:
-    """Recommend the tolerance that leaves the fewest noisy cells; None if no tolerance helps.
-
-    A noisy cell differs slightly from 0 or from a multiple of 15 degrees. The reason is a rounded angle in
-    the file, for example 1.5708.
-    """
+    """Recommend the tolerance that leaves the fewest noisy cells."""
     noisy = find_noisy_cells(table) if table.snap is None else []
     if not noisy:
         return None

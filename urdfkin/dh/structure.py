@@ -55,7 +55,12 @@ _ALPHA, _THETA = (
 
 @dataclass(frozen=True, slots=True)
 class AxisPair:
-    """Angle (at most pi/2) and distance (m) of two axes; the distance is 0 if one joint is prismatic."""
+    """Two consecutive axes.
+
+    Attributes:
+        angle: Angle between the axes, at most pi/2 rad.
+        distance: Distance of the axes, m; 0 if a joint is prismatic.
+    """
 
     first: str
     second: str
@@ -65,11 +70,12 @@ class AxisPair:
 
 @dataclass(frozen=True, slots=True)
 class StructureKind:
-    """A geometric property of consecutive joints, for example "spherical wrist".
+    """A property of consecutive joints, such as "spherical wrist".
 
-    `radians` and `metres` are the largest deviations from the exact property. For a spherical wrist, `metres`
-    is the largest distance of an axis from the point `at`. `at` is the intersection of the axes in the base
-    frame, in the zero configuration (metres).
+    Attributes:
+        radians: Largest deviation of an angle.
+        metres: Largest deviation of a length.
+        at: Intersection of the axes in the base frame and zero configuration, m.
     """
 
     name: str
@@ -87,19 +93,14 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    `reach` is an upper bound (m) of the tip's distance from the point `reach_from`, within the joint limits.
-    `sampled_reach` is the largest distance (m) from this point in sampled configurations. `reach_from` is a
-    point in the base frame (m), and does not depend on the configuration. `reach_point` describes the point
-    in words:
+    `reach` and `sampled_reach` are distances of the tip from `reach_from`.
+    Prismatic joints without limits are sampled within `ASSUMED_LIMIT`.
 
-    - The first two joints are revolute, and their axes are not nearly parallel (more than 0.02 rad): the
-      point of the first axis that is nearest to the second axis.
-    - The first two axes are nearly parallel, the second joint is prismatic, or only one joint moves: the
-      point of the first axis that is nearest to the base's origin.
-    - The first joint is prismatic, or no joint moves: the base's origin.
-
-    If a prismatic joint has no limits, `reach` is infinite. In the sampled configurations, this joint is
-    within `ASSUMED_LIMIT` of zero.
+    Attributes:
+        reach: Upper bound (m) within the joint limits; infinite if a prismatic joint has no limits.
+        sampled_reach: Largest sampled distance, m.
+        reach_from: Point in the base frame (m), independent of q.
+        reach_point: Description of `reach_from`.
     """
 
     robot: str
@@ -161,7 +162,11 @@ def _make_pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def find_intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and the distance (m) from there to the farthest axis."""
+    """Return the least-squares intersection of axes.
+
+    Returns:
+        The point, and its largest distance to an axis (m).
+    """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -209,10 +214,7 @@ def _find_arm_kinds(
 
 
 def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the known closed-form solutions of an arm.
-
-    If the arm has a required property only approximately, the solution is approximate too.
-    """
+    """Return exact and approximate closed-form solutions."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -244,7 +246,6 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
 
 
 def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
-    """Return the point (m, base frame) from which the reach is measured, and a text that names the point."""
     if not screws.joints or not screws.joints[0].kind.turns:
         return np.zeros(3), "the base's origin"
     if len(screws.joints) > 1 and screws.joints[1].kind.turns:
@@ -259,11 +260,11 @@ def _find_origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance (m) from the point `origin`, within the joint limits.
+    """Bound the tip's distance from `origin`.
 
-    The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
-    next axis that is nearest to the previous vertex. Travel of prismatic joints is added. The bound is
-    infinite if a prismatic joint has no limits.
+    p_0 = origin
+    p_i: point of the next revolute axis that is nearest to p_{i-1}
+    bound = |p_1 - p_0| + ... + |p_n - p_{n-1}| + |tip - p_n| + travel of the prismatic joints
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -278,9 +279,10 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions at random joint values, and the Jacobian at the first of these samples.
+    """Sample tip positions without mimic rules.
 
-    Mimic rules are ignored, so every joint moves independently.
+    Returns:
+        Positions, and the Jacobian of the first sample.
     """
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
@@ -289,10 +291,13 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpwParameters:
-    """The OPW parameters of an arm; q_opw = sign * q - offset, where q are the URDF's joint values.
+    """The OPW parameters of an arm.
 
-    `base` is the pose of the solver's base in the URDF's base. `tool` is the pose of the URDF's tip in the
-    solver's flange frame.
+        q_opw = sign * q - offset
+
+    Attributes:
+        base: T_base_opw.
+        tool: T_flange_tip.
     """
 
     joints: tuple[str, ...]
@@ -303,7 +308,10 @@ class OpwParameters:
     tool: FloatArray
 
     def placement(self, q: FloatArray) -> FloatArray:
-        """Return the (..., 4, 4) pose base . F(sign * q - offset) . tool, with the solver's kinematics F."""
+        """Return base . F(sign * q - offset) . tool.
+
+        F is the solver's forward kinematics.
+        """
         t = np.moveaxis(np.asarray(q) * self.signs - np.array(self.offsets), -1, 0)
         a1, a2, b, c1, c2, c3, c4 = self.lengths.values()
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
@@ -322,7 +330,6 @@ class OpwParameters:
         return np.asarray(self.base @ T @ self.tool)
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return plain data with the keys of the solver's configuration files, in metres and radians."""
         return {
             "opw_kinematics_geometric_parameters": self.lengths,
             "opw_kinematics_joint_offsets": list(self.offsets),
@@ -334,9 +341,9 @@ class OpwParameters:
 
 
 def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameters:
-    """Return the OPW parameters of a path; raise InputError if the path is not an OPW arm.
+    """Find the OPW parameters.
 
-    `tolerance` is the largest allowed error of the tip on `OPW_SAMPLES` configurations (metres and radians).
+    `tolerance` is the largest allowed error of the tip (m and rad).
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -370,9 +377,9 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield a table with OPW parameters (ortho-parallel, wrist) for each choice of the signs of a1, a2 and b.
+    """Yield an OPW table for each choice of the signs of a1, a2 and b.
 
-    The lengths in the tables are approximately the arm's lengths.
+    The lengths are approximate.
     """
     rows = derive(path, DerivationOptions(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
@@ -389,10 +396,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read_parameters(table: DHTable) -> OpwParameters:
-    """Read the OPW parameters from a table.
-
-    `table` must be a result of `derive_matching_table` with an OPW table as the reference.
-    """
+    """`table` comes from `derive_matching_table` with a reference from `_candidate_tables`."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -402,21 +406,22 @@ def _read_parameters(table: DHTable) -> OpwParameters:
 
 
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
+    """Return the axes h_i and the vectors P_i.
 
-    The first vector begins at the base, and the last vector ends at the tip. If two consecutive axes have the
-    same point in `_shared_points`, the vector between the axes is exactly zero. Solvers use this zero vector
-    to detect that the axes intersect.
+    All joints must be revolute. P_0 begins at the base, and P_n ends at the tip.
+    Solvers detect intersecting axes by an exactly zero vector.
+
+    Returns:
+        (n, 3) unit axes, and (n + 1, 3) vectors, m.
     """
     points = np.vstack([np.zeros(3), _shared_points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
 def _shared_points(screws: ProductOfExponentials) -> FloatArray:
-    """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
+    """Return a point of each axis; intersecting axes have the same point.
 
-    If an axis has several intersections, an intersection of three axes has priority over an intersection of
-    two axes. Among intersections of the same number of axes, the last intersection on the path has priority.
+    Three axes have priority over two, and later intersections over earlier ones.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -39,7 +39,11 @@ from urdfkin.system.lazy_import import get_hook
 
 
 class DHConvention(StrEnum):
-    """The convention of a table: joint i has the axis z_{i-1} (standard, distal) or z_i (modified, Craig)."""
+    """Convention of a table.
+
+    standard (distal): joint i has the axis z_{i-1}
+    modified (Craig): joint i has the axis z_i
+    """
 
     STANDARD = "standard"
     MODIFIED = "modified"
@@ -59,19 +63,19 @@ def convention_of(name: str) -> DHConvention:
 
 @dataclass(frozen=True, slots=True)
 class DHRow:
-    """One row of a table: the constant parts of one joint's parameters, in metres and radians.
+    """One row of a table: constant parameters in metres and radians.
 
     Attributes:
-        a: Length along x: a_i in a standard table, a_{i-1} in a modified table.
-        alpha: Rotation about x: alpha_i in a standard table, alpha_{i-1} in a modified table.
-        d: Offset along the joint's axis; the joint's value is added for a prismatic joint.
-        theta: Rotation about the joint's axis; the joint's value is added for a revolute joint.
+        a: Length along x; a_{i-1} in a modified table.
+        alpha: Rotation about x; alpha_{i-1} in a modified table.
+        d: Offset along the joint's axis, without a prismatic joint's value.
+        theta: Rotation about the joint's axis, without a revolute joint's value.
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
-        beta: Rotation about y after the rotation alpha; 0 except in a Hayati row.
-        mimic: The mimic rule; None if the joint is not a mimic joint and has its own coordinate.
-        limit: The joint's limits; None if it has no limits.
+        beta: Rotation about y after alpha; 0 except in a Hayati row.
+        mimic: The mimic rule; None if the joint has its own coordinate.
+        limit: The joint's limits; None without limits.
 
     >>> import urdfkin
     >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -119,10 +123,11 @@ class DHRow:
 
     @property
     def distance_to_normal(self) -> float:
-        """Distance (m) along the next axis between the row's x axis and the common normal.
+        """Distance (m) along the next axis from x to the common normal.
 
-        The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
-        offset is |a sin(beta)| / sin^2(tilt); it is 0 if `beta` is 0.
+        A Hayati row's x axis intersects the next axis, but is not the common normal.
+
+            distance = |a sin(beta)| / sin^2(tilt)
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].distance_to_normal
@@ -160,7 +165,11 @@ _RIGID_TOLERANCE = 1e-6
 
 
 def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return S = Rz(theta) Tz(d) (..., 4, 4), radians and metres; the arguments broadcast."""
+    """Return S = Rz(theta) Tz(d); radians and metres.
+
+    Returns:
+        (..., 4, 4) poses; the arguments broadcast.
+    """
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
     S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
@@ -172,7 +181,7 @@ def joint_transform(theta: ArrayLike, d: ArrayLike) -> FloatArray:
 
 
 def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
-    """Return the (4, 4) transform X = Tx(a) Rx(alpha) Ry(beta), metres and radians."""
+    """Return X = Tx(a) Rx(alpha) Ry(beta); metres and radians."""
     ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
     return np.array(
         [
@@ -185,7 +194,10 @@ def link_transform(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 
 
 def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
-    """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
+    """Factor a pose into Tx(a) Rx(alpha).
+
+    Returns:
+        None if the pose has another form.
 
     >>> as_a_and_alpha(link_transform(0.5, math.pi))
     (0.5, 3.141592653589793)
@@ -201,12 +213,14 @@ def is_identity(T: FloatArray) -> bool:
 
 
 def angle_difference(first: float, second: float) -> float:
-    """Return first - second (rad) modulo 2 pi, in [-pi, pi]."""
+    """Return first - second modulo 2 pi, in [-pi, pi]."""
     return math.remainder(first - second, 2.0 * math.pi)
 
 
 def wrap_angle(angle: float) -> float:
-    """Return the equivalent angle in (-pi, pi]; an angle that is -pi up to rounding becomes pi.
+    """Return the equivalent angle in (-pi, pi].
+
+    An angle that is -pi up to rounding becomes pi.
 
     >>> wrap_angle(-math.pi) == math.pi, wrap_angle(7.0) == 7.0 - 2 * math.pi
     (True, True)
@@ -216,16 +230,14 @@ def wrap_angle(angle: float) -> float:
 
 
 def clean_angle(angle: float) -> float:
-    """Wrap an angle into (-pi, pi]; a multiple of pi/12 with a rounding error becomes exact."""
+    """Wrap an angle, and make multiples of pi/12 exact."""
     angle = wrap_angle(angle)
     twelfth = nearest_twelfth(angle)
     return wrap_angle(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE_ROUNDINGS * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a multiple of 15 degrees, but not 0.
-
-    `twelfth` is 15 degrees in the unit of the angle.
+    """Whether an angle is nearly a nonzero multiple of `twelfth`.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -234,24 +246,19 @@ def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
 
 
 def nearest_twelfth(angle: float) -> float:
-    """Return the multiple of pi/12 that is nearest to an angle (rad)."""
+    """Return the nearest multiple of pi/12."""
     return round(angle * 12.0 / math.pi) * math.pi / 12.0
 
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """The effect of one angle that urdfkin rounded to a multiple of 15 degrees.
-
-    The rounding rotates the rest of the chain about a point.
+    """An angle that was rounded to a multiple of 15 degrees.
 
     Attributes:
-        row: Index of the changed row, from 0. The index -1 means the base, and the index n means the tool of
-            a table with n rows.
-        angle: Angle (rad) by which the rest of the chain rotates.
-        lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
-            zero.
-        prismatic_joints: Prismatic joints between the rotation's centre and the tip. The travel of these
-            joints increases the distance.
+        row: Index of the row; -1 is the base, n the tool.
+        angle: Rotation of the rest of the chain, rad.
+        lever: Bound of the tip's distance (m) from the rotation's centre, with prismatic joints at zero.
+        prismatic_joints: Prismatic joints between this centre and the tip.
     """
 
     row: int
@@ -262,7 +269,7 @@ class SnapChange:
 
     @property
     def tip_displacement(self) -> float:
-        """Bound of the tip's displacement by this change (m), with prismatic joints at zero."""
+        """Bound of the tip's displacement (m), with prismatic joints at zero."""
         return self.angle * self.lever
 
 
@@ -270,18 +277,19 @@ class SnapChange:
 class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
-    Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    the distance between the tip and this origin. The sum of these bounds is a bound for all changes together.
+    Each change rotates the rest of the chain about a joint's origin:
+
+        displacement of the tip <= sum of angle * distance from this origin to the tip
 
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement (metres). The bound holds if each prismatic joint
-            is within its limits, or within 10 m of zero if the joint has no limits.
-        radians: Guaranteed bound of the tip's rotation (radians).
-        per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
-        measured_metres: Largest displacement of the tip in sampled configurations (metres).
-        measured_radians: Largest rotation of the tip in sampled configurations (radians).
+        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits. Prismatic
+            joints without limits may travel at most 10 m.
+        radians: Guaranteed bound of the tip's rotation.
+        per_metre: Increase of the bound per metre of travel, by prismatic joint.
+        measured_metres: Largest displacement of the tip in samples.
+        measured_radians: Largest rotation of the tip in samples.
         samples: Number of sampled configurations.
     """
 
@@ -296,16 +304,16 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Sorted indices of the rows with changed angles.
+        """Sorted indices of the changed rows.
 
-        The index -1 means the base, and the index n means the tool of a table with n rows.
+        The base has the index -1, and the tool has the index n.
         """
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (...,) of the tip's displacement (metres).
+        """Return a guaranteed bound (...,) of the tip's displacement (m).
 
-        `values` contains the values of the prismatic joints by name.
+        `values` are the prismatic joints' values by name.
         """
         at_zero = sum(change.tip_displacement for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
@@ -324,7 +332,7 @@ class DHTable(Displayable):
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        snap: The rounded angles and their effect on the tip; None for an exact table.
+        snap: The effect of rounded angles; None for an exact table.
 
     Raises:
         InputError: two rows name the same joint, or base or tool is not a rigid transform.
@@ -375,7 +383,7 @@ class DHTable(Displayable):
         return "\n".join(map(log_line, self._export_text("terminal", parse_units()).split("\n")))
 
     def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """Return the table in Markdown, for a README or an issue.
+        """Return the table in Markdown.
 
         Args:
             angles: "radians" (exact multiples of pi/12 as fractions of pi) or "degrees".
@@ -393,7 +401,9 @@ class DHTable(Displayable):
         return self._export_text("markdown", parse_units(angles, lengths, digits))
 
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`.
+        """Return the table in LaTeX (amsmath, booktabs, graphicx).
+
+        The arguments are those of `to_markdown`.
 
         >>> import urdfkin
         >>> "tabular" in urdfkin.load("planar_two_link").dh("tip", "base").to_latex()
@@ -402,7 +412,9 @@ class DHTable(Displayable):
         return self._export_text("latex", parse_units(angles, lengths, digits))
 
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
-        """Return the table in HTML, for a web page; arguments as in `to_markdown`.
+        """Return the table in HTML.
+
+        The arguments are those of `to_markdown`.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -427,7 +439,7 @@ class DHTable(Displayable):
 
     @cached_property
     def coupling(self) -> Coupling:
-        """The map from the table's coordinates to the values of the table's joints.
+        """The map from coordinates to joint values.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names
@@ -437,7 +449,7 @@ class DHTable(Displayable):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the table's coordinates, in row order: the independent and the mimicked joints.
+        """Names of the independent and the mimicked joints, in row order.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").joint_names
@@ -459,7 +471,9 @@ class DHTable(Displayable):
 
     @property
     def unlimited(self) -> tuple[str, ...]:
-        """Names of the prismatic joints without limits. Bounds assume that these joints travel at most 10 m.
+        """Names of the prismatic joints without limits.
+
+        Bounds assume that these joints travel at most 10 m.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited
@@ -469,7 +483,7 @@ class DHTable(Displayable):
 
     @cached_property
     def span(self) -> float:
-        """Sum (metres) of all |a|, all |d| and the length of the tool, with all joints at zero.
+        """Sum (metres) of all |a|, all |d| and the tool's length.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").span
@@ -479,11 +493,13 @@ class DHTable(Displayable):
         return lengths + math.hypot(*self.tool[:3, 3])
 
     def rounding(self, q: ConfigurationLike) -> FloatArray:
-        """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
+        """Return a bound (...,) of the rounding error of the position (metres).
 
-        The bound is the length of the chain times the sum of all rounding errors of rows and angles
-        (`urdfkin.kinematics.roundings`). The bound divided by `span` is a bound of the orientation error in
-        radians.
+        The bound divided by `span` bounds the orientation error in radians.
+
+            bound = length of the chain * sum of the rounding errors of rows and angles
+
+        `urdfkin.kinematics.roundings` counts these rounding errors.
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)
@@ -496,9 +512,12 @@ class DHTable(Displayable):
         return np.asarray(EPS * (table_roundings(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: ConfigurationLike) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (...,), in m and rad, of the difference between the table's and the URDF's tip pose.
+        """Return bounds of the difference between the table's and the URDF's tip.
 
-        The bounds cover rounding errors, and the effect of rounded angles if `snap` is not None.
+        The bounds cover rounding errors and the effect of snapped angles.
+
+        Returns:
+            (...,) bounds in metres, and in radians.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -520,8 +539,8 @@ class DHTable(Displayable):
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names` (rad or m), or the values by name as a mapping
-                or text. None stands for the zero configuration.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
+                text). None: the zero configuration.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -538,7 +557,6 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The path from the base to frame n; each row gives one motion and one constant pose."""
         steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
             motion = ElementaryMotion(2, row.kind.turns)
@@ -548,11 +566,13 @@ class DHTable(Displayable):
         return Path(tuple(steps))
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
+        """Return the (..., 4, 4) pose T_base_tip.
+
+        The pose is the product of base, rows and tool.
 
         Args:
-            q: (..., coordinates) in the order of `joint_names` (rad or m), or the values by name as a mapping
-                or text.
+            q: (..., coordinates) in the order of `joint_names` (rad or m), or values by name (mapping or
+                text).
 
         Raises:
             InputError: `q` has the wrong length.

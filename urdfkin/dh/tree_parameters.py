@@ -48,18 +48,15 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 
 @dataclass(frozen=True, slots=True)
 class TreeRow:
-    """The row of one joint and its child link, in metres and radians.
+    """The row of one joint.
 
-    The cells gamma, b, d, alpha, beta, theta and r define the pose of the link's frame in the antecedent's
-    frame. This pose is Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r). The joint's value is added
-    to theta if sigma is 0, and to r if sigma is 1.
+    The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
+        antecedent: Row index of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        mimicked_joint: Name of the mimicked joint; the joint's own name if it mimics no other joint.
-        multiplier: Factor of the mimic rule. The value of a mimic joint is
-            multiplier * (value of the mimicked joint) + offset.
+        mimicked_joint: The mimicked joint; without a mimic rule, the joint itself.
+        multiplier: value = multiplier * mimicked value + offset
     """
 
     joint: str
@@ -80,14 +77,12 @@ class TreeRow:
 
 @dataclass(frozen=True)
 class TreeParameters:
-    """The table of a whole robot, with a row for each joint, including fixed joints.
+    """The table of a whole robot.
 
     Attributes:
-        path_lengths: (joints,) length (metres) of the URDF's path from the root to each joint's origin. The
-            method `reach` adds the travel of prismatic joints.
-        T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        zeroed_tilt: A tilt that may be a rounding error is set to zero. `zeroed_tilt` is the largest sum
-            (rad) of such tilts on a path from the root.
+        path_lengths: (joints,) path lengths from the root to the joint origins in the URDF, m.
+        T_frame_link: (joints, 4, 4) poses of the URDF link frames in the rows' frames.
+        zeroed_tilt: Largest sum of the tilts set to zero on a path from the root, rad.
     """
 
     robot: str
@@ -99,22 +94,23 @@ class TreeParameters:
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the independent moving joints, in the tree's order: the columns of `q`."""
+        """Names of the columns of `q`."""
         return tuple(row.joint for row in self.rows if row.sigma < 2 and row.mimicked_joint == row.joint)
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses, in eps * reach; not a proven bound.
+        """Estimated rounding error, in eps * reach.
 
-        The estimate does not include Pinocchio's rounding errors.
+        The estimate is not a proven bound, and excludes Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return table_roundings(1 + longest) + self.zeroed_tilt / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints) path length (metres) from the root to each link at `q`.
+        """Return the path lengths from the root to the links at `q`.
 
-        The result is the larger of the path lengths in the URDF and in the table.
+        Returns:
+            (..., joints) lengths (m), the larger of the URDF's and the table's.
         """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
@@ -135,7 +131,6 @@ class TreeParameters:
         return path
 
     def _values(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints) values of all joints; zero for fixed joints."""
         column = {name: i for i, name in enumerate(self.coordinates)}
         values = np.zeros((*q.shape[:-1], len(self.rows)))
         for j, row in enumerate(self.rows):
@@ -144,9 +139,12 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
+        """Return the poses of all links.
 
-        `q` (..., coordinates) is in the order of `coordinates`. Another length raises InputError.
+        `q` is in the order of `coordinates`.
+
+        Returns:
+            (..., joints, 4, 4) URDF frames in the root frame.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -164,7 +162,7 @@ class TreeParameters:
 
 
 def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
-    """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding."""
+    """Return Khalil and Kleinfinger's parameters, exact up to rounding."""
     check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
@@ -191,11 +189,12 @@ def make_tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 @dataclass(frozen=True, slots=True)
 class _LinkAxis:
-    """The axis frame of a link, with z along the axis of the link's joint.
+    """The axis frame of a link.
 
-    `T_antecedent_axis` is the pose of this axis frame in the antecedent's axis frame. `T_link_axis` is the
-    pose of this axis frame in the link's URDF frame. Small tilts on the path from the root to the link are
-    set to zero. `zeroed_tilt` is the sum (rad) of these tilts.
+    Attributes:
+        T_antecedent_axis: Pose in the antecedent's axis frame.
+        T_link_axis: Pose in the link's URDF frame.
+        zeroed_tilt: Sum of the tilts set to zero on the path from the root, rad.
     """
 
     antecedent: int
@@ -206,7 +205,7 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
+    """Return the axis frames; a fixed joint's link has its URDF frame."""
     links = list[_LinkAxis]()
     # For each link: (i, T_i_link, number of fixed joints from link i).
     # i is the moving link's own index, or the antecedent's index.
@@ -226,10 +225,10 @@ def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis
 def _find_transforms(
     tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
-    """Return a transform for each joint, and an angle and an offset for each moving link.
+    """Rz(phi) Tz(delta) moves a link's axis frame to the row's frame.
 
-    The transform leads from the axis of the antecedent to the joint's axis. The angle is a rotation about z,
-    and the offset is a shift along z. This motion moves the axis frame of a link to the frame of its row.
+    Returns:
+        Transforms, and (phi, delta) by link.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
@@ -282,7 +281,6 @@ def _make_row(
 
 
 def _path_lengths(tree: KinematicTree) -> list[float]:
-    """Return the length (m) of the path from the root to each joint's origin."""
     lengths = [0.0]
     for joint in tree.joints:
         lengths.append(lengths[joint.parent] + joint.length)
@@ -293,7 +291,7 @@ _FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), 
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
-    """Return plain data in metres and radians; row numbers begin at 1, and 0 is the root."""
+    """Return plain data (m, rad); row numbers begin at 1, and 0 is the root."""
     return {
         "notation": "Khalil-Kleinfinger",
         "robot": table.robot,
@@ -332,7 +330,6 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV (m, rad): the rows, each followed by the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):
@@ -342,7 +339,6 @@ def as_csv(table: TreeParameters) -> str:
 
 
 def measure_printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Compare the link positions of a printed and an exact table at `q` (n, coordinates)."""
     again = replace(table, rows=tuple(_round_tree_row(row, units) for row in table.rows))
     distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))

@@ -40,7 +40,10 @@ _MAX_CELL_LENGTH = 200
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Format of printed numbers; exact multiples of pi/12 in radians are written as fractions of pi."""
+    """Format of printed numbers.
+
+    In radians, exact multiples of pi/12 become fractions of pi.
+    """
 
     angles: AngleUnit = AngleUnit.RADIANS
     lengths: LengthUnit = LengthUnit.METRES
@@ -60,7 +63,6 @@ class Units:
         return "m" if self.lengths is LengthUnit.METRES else "mm"
 
     def format_angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle (rad); `pi` is the text for pi."""
         fraction = pi_fraction(radians)
         if self.angles is AngleUnit.DEGREES:
             return str(fraction * 180) if fraction is not None else self._format_number(math.degrees(radians))
@@ -77,13 +79,13 @@ class Units:
         return self._format_number(metres if self.lengths is LengthUnit.METRES else metres * 1000.0)
 
     def round_angle(self, radians: float) -> float:
-        """Return the value (rad) of the printed angle."""
+        """Return the printed value in radians."""
         text = self.format_angle(radians)
         number = parse_number(text, "printed")
         return number if "pi" in text else convert_to_si("theta", number, self)
 
     def round_length(self, metres: float) -> float:
-        """Return the value (m) of the printed length."""
+        """Return the printed value in metres."""
         return convert_to_si("d", parse_number(self.format_length(metres), "printed"), self)
 
     def _format_number(self, value: float) -> str:
@@ -91,7 +93,7 @@ class Units:
 
 
 def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
-    """Return units from their names (also rad, deg, m and mm); raise InputError for an unknown name."""
+    """Return units from their names."""
     try:
         angles, lengths = (_UNIT_NAMES.get(name, name) for name in (angles, lengths))
         return Units(AngleUnit(angles), LengthUnit(lengths), digits)
@@ -105,7 +107,11 @@ def parse_units(angles: str = "radians", lengths: str = "metres", digits: int = 
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a multiple of pi if it is exactly a multiple of pi/12; None for any other angle."""
+    """Return an angle as a fraction of pi.
+
+    Returns:
+        None if the angle is not exactly a multiple of pi/12.
+    """
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
@@ -119,7 +125,7 @@ def format_pi_fraction(fraction: Fraction, pi: str = "pi") -> str:
 
 
 def parse_number(value: object, where: str) -> float:
-    """Parse a number, or the text of a number or of a multiple of pi."""
+    """Parse a number or a text such as pi/2."""
     try:
         number = _parse_number(value)
     except (ValueError, TypeError, OverflowError, ZeroDivisionError):
@@ -143,7 +149,10 @@ def _parse_number(value: object) -> float:
 
 
 def convert_to_si(name: str, number: float, units: Units) -> float:
-    """Convert the cell `name` to metres or radians; 90 degrees become exactly math.pi / 2."""
+    """Convert a cell to metres or radians.
+
+    90 degrees become exactly math.pi / 2.
+    """
     if name in ("a", "d"):
         return number / 1000.0 if units.uses_millimetres else number
     return number if units.angles is AngleUnit.RADIANS else radians_from_degrees(number)
@@ -184,7 +193,7 @@ _TOKEN = re.compile(
 
 
 class InvalidCellError(ValueError):
-    """The text is not a valid cell; the message states the reason."""
+    """Invalid text of a cell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,11 +201,11 @@ class Cell:
     """The content of a cell, for example -q2 + 90 deg.
 
     Attributes:
-        number: The constant, in `unit`; in the table's unit if `unit` is None.
-        unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
-        factor: Factor of the joint's variable; None if the cell has no variable.
-        variable: Number in the variable's name, for example 2 for q2.
-        text: Text of the constant if it is a single number, otherwise "".
+        number: The constant, in `unit`.
+        unit: "rad" (also with pi), "deg", "m" or "mm"; None: the table's unit.
+        factor: Factor of the variable; None without variable.
+        variable: Number in the variable's name, 2 for q2.
+        text: Text of a single number, otherwise "".
     """
 
     number: float
@@ -211,7 +220,7 @@ class Cell:
 
 
 def to_plain_text(text: str) -> str:
-    r"""Convert a text with symbols or LaTeX to plain letters.
+    r"""Convert symbols and LaTeX to plain letters.
 
     >>> to_plain_text("−π/2"), to_plain_text(r"$\frac{\pi}{2} + \theta_{1}$").split(), to_plain_text("θ₁*")
     ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
@@ -222,7 +231,7 @@ def to_plain_text(text: str) -> str:
 
 
 def parse_cell(original: str) -> Cell:
-    """Parse a cell; raise InvalidCellError for an invalid cell.
+    """Parse the text of a cell.
 
     >>> parse_cell("-q2 + 90°")
     Cell(number=90.0, unit='deg', factor=-1.0, variable=2, text='90')
@@ -256,7 +265,11 @@ def parse_cell(original: str) -> Cell:
 
 @dataclass(slots=True)
 class _Term:
-    """A term of the sum in a cell. `operator` is "*" or "/" if this was the last token, otherwise ""."""
+    """A term of a cell's sum.
+
+    Attributes:
+        operator: The last token if "*" or "/", otherwise "".
+    """
 
     sign: float = 1.0
     size: float | None = None

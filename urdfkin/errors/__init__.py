@@ -16,7 +16,7 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Maximum length of a name in `find_similar_names`.
+#: Number of leading characters of a name that `find_similar_names` compares.
 _MAX_COMPARED_CHARACTERS = 128
 MAX_COMPARISONS = 1_000_000
 _MAX_SUGGESTIONS = 3

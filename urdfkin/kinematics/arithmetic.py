@@ -21,7 +21,7 @@ VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transp
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Copy all functions of `equations`; the copies use the given operations, such as `plus` and `cross`.
+    """Copy the equations for other vector operations.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -33,11 +33,12 @@ def bind_equations(
 def rebind_functions(
     *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Copy the functions of some modules; the result maps the name of each function to the copy.
+    """Copy functions; the copies call each other.
 
-    A copy calls other copies instead of the original functions. An entry of `replacements` replaces the
-    function or the module of the same name. `decorate` is applied to each copy. List a module after the
-    modules whose functions it uses.
+    Args:
+        modules: Each module after the modules that it uses.
+        decorate: Decorator of each copy.
+        replacements: Functions or modules by name.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -58,9 +58,12 @@ from urdfkin.kinematics.rotation import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingFrame:
-    """Pose, velocity and acceleration of frame 1 relative to frame 0, expressed in frame 0.
+    """The motion of frame 1 relative to frame 0.
 
-    `d_0_1` is the interorigin vector from O_0 to O_1; `v_0_1` and `a_0_1` are its time derivatives.
+    Attributes:
+        d_0_1: Vector from O_0 to O_1.
+        v_0_1: First derivative of `d_0_1`.
+        a_0_1: Second derivative of `d_0_1`.
     """
 
     R_0_1: FloatArray
@@ -79,11 +82,15 @@ class MovingFrame:
 
 
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
-    """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
+    """Return the motion of frame 2 (7.60, 7.61).
 
-    `outer` is the motion of frame 1 relative to frame 0. `inner` is the motion of frame 2 relative to frame
-    1, in frame 1. The origin O_2 is a point that moves in frame 1 (7.58, 7.124, 7.125). The time derivative
-    of the angular velocity w_01 + w_12 (7.49) contains the term w_01 x w_12.
+    `inner` is the motion of frame 2 relative to frame 1.
+
+    | quantity | equation |
+    |---|---|
+    | position, velocity, acceleration | 7.58, 7.124, 7.125: O_2 moves in frame 1 |
+    | angular velocity | 7.49: w_01 + w_12 |
+    | angular acceleration | derivative of 7.49, with the term w_01 x w_12 |
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -99,15 +106,15 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
-    """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
+    """Return the motion of the last frame (7.50, 7.61).
 
-    Entry i of `frames` is the motion of frame i + 1 relative to frame i.
+    Entry i is the motion of frame i + 1 relative to frame i.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
 
 def relative_pose(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1."""
+    """Return T_1_2 = T_0_1^-1 T_0_2."""
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]
@@ -121,7 +128,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """Terms w x p, R v_1 and d-dot of a point's velocity (7.124), (..., 3), m/s in frame 0."""
+    """The terms w x p, R v_1 and d-dot of a velocity (7.124), m/s."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -134,7 +141,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0; see `point_acceleration`."""
+    """The terms of a point's acceleration (7.125), m/s^2."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -148,13 +155,16 @@ class AccelerationParts:
 
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
-    """Return p_0 = d_01 + R p_1, the position (..., 3) of a point of frame 1 in frame 0 (7.58)."""
+    """Return p_0 = d_01 + R p_1 (7.58)."""
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, as_vectors(p_1, "p_1"))
     return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return the terms of p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if v_1 = 0)."""
+    """Return the terms of a point's velocity (7.124; 7.59 if v_1 = 0).
+
+    p-dot_0 = w x R p_1 + R v_1 + d-dot_01
+    """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
     relative = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -164,9 +174,9 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -
 def point_acceleration(
     frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
-    """Return the terms of p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
+    """Return the terms of a point's acceleration (7.125; 7.123 if fixed).
 
-    For a point that is fixed in frame 1, the sum of the terms is the acceleration of equation 7.123.
+    p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot
     """
     p_0 = eq.rotate(frame.R_0_1, as_vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, as_vectors(v_1, "v_1"))
@@ -177,7 +187,7 @@ def point_acceleration(
 
 
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
-    """Return the vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`."""
+    """Return d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64)."""
     vector: FloatArray = eq.interorigin_vector(
         as_finite(d, "d"), as_unit_vectors(z, "z"), as_finite(a, "a"), as_unit_vectors(x, "x")
     )
@@ -185,7 +195,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's angular velocity: theta-dot z if rotary (7.62), and 0 if prismatic (7.63)."""
+    """Return theta-dot z (7.62), or 0 for a prismatic joint (7.63)."""
     w: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
@@ -193,10 +203,14 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """Return the time derivative of the interorigin vector d_{i-1,i}, `d_vector` (7.73, 7.74).
+    """Return the derivative of d_{i-1,i} (7.73, 7.74).
 
-    The derivative is w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
-    angular velocity w_0i of link i is w_{i-1,i}. Equations 7.73 and 7.74 then become equations 7.66 and 7.67.
+    | joint | derivative |
+    |---|---|
+    | rotary | w_0i x d_{i-1,i} (7.73) |
+    | prismatic | w_0i x d_{i-1,i} + d-dot_i z (7.74) |
+    | rotary, only joint i moves | w_{i-1,i} x d_{i-1,i} (7.66) |
+    | prismatic, only joint i moves | w_{i-1,i} x d_{i-1,i} + d-dot_i z (7.67) |
     """
     rotation: FloatArray = eq.tangential(as_vectors(w_0_i, "w_0_i"), as_vectors(d_vector, "d_vector"))
     sliding: FloatArray = as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(z, "z")
@@ -204,10 +218,14 @@ def interorigin_velocity(
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's column of the velocity Jacobian (7.80, 7.85).
+    """Return a column of the velocity Jacobian (7.80, 7.85).
 
-    The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is the vector
-    d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
+    | joint | column |
+    |---|---|
+    | rotary | [z x arm; z] |
+    | prismatic | [z; 0] |
+
+    The arm d_{i-1,n} leads from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(as_unit_vectors(z, "z"), as_vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -215,34 +233,36 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
-    """Return the rotation R(theta) (..., 2, 2) of the plane (7.5); its columns are x1 and y1 in frame 0."""
+    """Return the planar rotation R(theta) (7.5).
+
+    The columns are x1 and y1 in frame 0.
+    """
     theta = as_finite(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
     return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta (..., 2, 2) of the rotation matrix in the plane (7.4, figure 7.2)."""
+    """Return dR/dtheta in the plane (7.4, figure 7.2)."""
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3)."""
+    """Return the endpoint d_01 = a x1 (7.1, 7.3)."""
     return as_finite(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7)."""
+    """Return d-dot_01 = a theta-dot y1 (7.2, 7.4, 7.7)."""
     speed = as_finite(length, "length") * as_finite(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Convert the velocity of frame n to the velocity of the tool frame.
+    """Convert the velocity of frame n to the tool.
 
-    The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, where `d_n_tool` (..., 3) is the vector
-    from O_n to O_tool in frame 0.
+    d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}
     """
     velocity, d = as_vectors(velocity, "velocity", 6), as_vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -251,10 +271,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Convert the velocity of the tool frame to the velocity of frame n (7.115).
-
-    This function is the inverse of `tool_velocity`.
-    """
+    """Convert the tool's velocity to frame n (7.115)."""
     return tool_velocity(velocity, -as_vectors(d_n_tool, "d_n_tool"))
 
 
@@ -262,15 +279,13 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation."""
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120): 6 by 6, or 6 by 7 for a quaternion.
+    """Return C = diag(I, Omega) in [d-dot; w] = C x-dot (7.119, 7.120).
 
-    C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
-    with the matrix E of 7.57.
+    For a quaternion, Omega is 4 E^T, with E of 7.57.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
@@ -278,10 +293,10 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122): 6 by 6, or 7 by 6 for a quaternion.
+    """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C has several right inverses. The function returns one of these right inverses. With
-    this inverse, the time derivative of the quaternion is perpendicular to the quaternion.
+    For a quaternion, C has several right inverses.
+    The returned inverse gives rates perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -291,12 +306,12 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return the manipulator Jacobian J = C^-1 J_v, which contains the derivatives of x (7.122)."""
+    """Return the manipulator Jacobian J = C^-1 J_v (7.122)."""
     return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """Convert the manipulator Jacobian J to the velocity Jacobian J_v = C J (7.121)."""
+    """Return the velocity Jacobian J_v = C J (7.121)."""
     C = representation_matrix(representation, R)
     return C @ _rows(J, "J", C.shape[-1])
 
@@ -304,7 +319,7 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation."""
+    """Return x-dot = C^-1 [d-dot; w]."""
     column = as_vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 

@@ -6,6 +6,19 @@ batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, le
 expressions. For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the
 functions of the section "vectors".
 
+| Argument | Meaning |
+|---|---|
+| `R`, `S` | rotations |
+| `sine`, `cosine` | sine and cosine of the rotation angle |
+| `zero`, `one` | 0 and 1 in the number type of `sine` |
+| `w`, `alpha` | angular velocity and angular acceleration of a link or frame |
+| `vel`, `acc` | velocity and acceleration of the frame's origin, or of a point P of the link |
+| `d` | vector from the origin or from P to another point |
+| `z`, `v`, `a` | a joint's axis, velocity and acceleration; z is fixed to the link before the joint |
+| `p`, `u`, `b` | position, velocity and acceleration of a point in a moving frame |
+| `o`, `u` | angular and linear velocity of a planar or floating joint |
+| `b` | for such a joint: time derivatives of the components of o or u |
+
 All vectors of an equation are expressed in the same axes: the world's axes, as in the textbook, or the link's
 own axes. In the link's own axes, z is (0, 0, 1) and d is constant.
 
@@ -29,32 +42,32 @@ def minus(x, y):
 
 
 def times(c, x):
-    """Return c x for a number c."""
+    """Return c x."""
     return c * x[0], c * x[1], c * x[2]
 
 
 def dot(x, y):
-    """Return the dot product x . y."""
+    """Return x . y."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 
 
 def cross(x, y):
-    """Return the cross product of x and y, which is S(x) y with the matrix of 7.16."""
+    """Return the cross product S(x) y (7.16)."""
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
 
 
 def rotate(R, x):
-    """Return R x, which converts the vector x from the rotated frame to the outer frame."""
+    """Return R x, expressed in the outer frame."""
     return dot(R[0], x), dot(R[1], x), dot(R[2], x)
 
 
 def transposed(R):
-    """Return R^T, which is the inverse of R (7.11)."""
+    """Return R^T, the inverse of R (7.11)."""
     return (R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2])
 
 
 def product(R, S):
-    """Return R S, which converts the orientation S from the frame with orientation R to the outer frame."""
+    """Return R S."""
     columns = transposed(S)
     return rotate(columns, R[0]), rotate(columns, R[1]), rotate(columns, R[2])
 
@@ -63,7 +76,7 @@ def product(R, S):
 
 
 def about_x(sine, cosine, zero, one):
-    """Return a rotation about x; `zero` and `one` are 0 and 1 in the number type of `sine`."""
+    """Return a rotation about x."""
     return (one, zero, zero), (zero, cosine, -sine), (zero, sine, cosine)
 
 
@@ -78,7 +91,7 @@ def about_z(sine, cosine, zero, one):
 
 
 def rotation_of_quaternion(x, y, z, w):
-    """Return the rotation matrix of a unit quaternion; w is the scalar part."""
+    """Return the rotation of a unit quaternion with scalar w."""
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
@@ -90,12 +103,12 @@ def rotation_of_quaternion(x, y, z, w):
 
 
 def point_position(d, R, p):
-    """7.58, 7.60, 7.77: position of a point p of a frame with origin d and orientation R."""
+    """7.58, 7.60, 7.77: position of a point p."""
     return plus(d, rotate(R, p))
 
 
 def interorigin_vector(d, z, a, x):
-    """7.64: the distance d along the axis z plus the length a along the common normal x."""
+    """7.64: interorigin vector d z + a x."""
     return plus(times(d, z), times(a, x))
 
 
@@ -103,31 +116,30 @@ def interorigin_vector(d, z, a, x):
 
 
 def angular_velocity(w, z, v):
-    """7.127, rotary: angular velocity of the link after a joint that turns about z with joint velocity v."""
+    """7.127, rotary: angular velocity after the joint."""
     return plus(w, times(v, z))
 
 
 def tangential(w, d):
-    """7.59: tangential velocity of a point at d, for the angular velocity w."""
+    """7.59: tangential velocity of a point."""
     return cross(w, d)
 
 
 def point_velocity(vel, w, d):
     """7.59, 7.115, 7.128: velocity of a point Q of a link.
 
-    The point P of the same link has the velocity vel. The vector d leads from P to Q, and w is the link's
-    angular velocity.
+    Point P has the velocity vel; the vector d leads from P to Q.
     """
     return plus(vel, tangential(w, d))
 
 
 def sliding_velocity(vel, z, v):
-    """7.128, prismatic: velocity of the link after a joint that slides along z with joint velocity v."""
+    """7.128, prismatic: velocity after the joint."""
     return plus(vel, times(v, z))
 
 
 def moving_point_velocity(vel, w, p, u):
-    """7.61, 7.124: velocity of a point p that moves with velocity u in a rotating frame."""
+    """7.61, 7.124: velocity of a moving point."""
     return plus(point_velocity(vel, w, p), u)
 
 
@@ -135,43 +147,40 @@ def moving_point_velocity(vel, w, p, u):
 
 
 def transverse(alpha, d):
-    """7.123: transverse acceleration of a point at d, for the angular acceleration alpha."""
+    """7.123: transverse acceleration of a point."""
     return cross(alpha, d)
 
 
 def centripetal(w, d):
-    """7.123: centripetal acceleration of a point at d, for the angular velocity w."""
+    """7.123: centripetal acceleration of a point."""
     return cross(w, cross(w, d))
 
 
 def coriolis(w, u):
-    """7.125: Coriolis acceleration of a point that moves with velocity u in a rotating frame."""
+    """7.125: Coriolis acceleration of a moving point."""
     return times(2, cross(w, u))
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration of the link after a joint.
-
-    The link before the joint has the angular velocity w and the angular acceleration alpha.
-    """
+    """7.129, rotary: angular acceleration after the joint."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
 def point_acceleration(acc, alpha, w, d):
     """7.123, 7.130: acceleration of a point Q of a link.
 
-    The point P of the same link has the acceleration acc, and the vector d leads from P to Q.
+    Point P has the acceleration acc; the vector d leads from P to Q.
     """
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 
 def sliding_acceleration(acc, w, z, v, a):
-    """7.130, prismatic: acceleration of the link after a joint; z is fixed to the link before the joint."""
+    """7.130, prismatic: acceleration after the joint."""
     return plus(plus(acc, times(a, z)), coriolis(w, times(v, z)))
 
 
 def moving_point_acceleration(acc, alpha, w, p, u, b):
-    """7.125: acceleration of a point p that moves with velocity u and acceleration b in a rotating frame."""
+    """7.125: acceleration of a moving point."""
     return plus(plus(point_acceleration(acc, alpha, w, p), coriolis(w, u)), b)
 
 
@@ -182,20 +191,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration of the link after a planar or floating joint.
-
-    The joint moves with the angular velocity o. The vector b contains the time derivatives of the components
-    of o.
-    """
+    """7.129: angular acceleration after a planar or floating joint."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration of the link after a planar or floating joint.
-
-    The joint moves with the linear velocity u and the angular velocity o. The vector b contains the time
-    derivatives of the components of u.
-    """
+    """7.130: acceleration after a planar or floating joint."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 
@@ -203,24 +204,24 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from the joint to the frame's origin."""
+    """7.80, 7.85: column [z x d; z] of a rotary joint."""
     return cross(z, d), z
 
 
 def axis_rate(w, z):
-    """Return the time derivative of an axis that is fixed to a link with angular velocity w (7.37)."""
+    """7.37: time derivative of an axis."""
     return cross(w, z)
 
 
 def turning_column_rate(z, z_rate, d, d_rate):
-    """7.126: time derivative of the Jacobian column [z x d; z] of a rotary joint."""
+    """7.126: time derivative of [z x d; z]."""
     return plus(cross(z_rate, d), cross(z, d_rate)), z_rate
 
 
 def rate_in_turning_axes(rate, w, x):
-    """Return the time derivatives of the components of x in axes that rotate with the angular velocity w.
+    """Return the time derivatives of the components of x.
 
-    `rate` is the time derivative of x in axes that do not rotate.
+    The axes of the components rotate with w; `rate` is x-dot in fixed axes.
     """
     return minus(rate, cross(w, x))
 
@@ -231,26 +232,27 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the derivative of the Jacobian column [linear; angular] (7.85) with respect to an earlier joint.
+    """Return the derivative of a column by an earlier joint (7.85).
 
-    At the joint velocity 1, the earlier joint rotates the vectors z and d of the column with the angular
-    velocity w.
+    At joint velocity 1, this joint rotates z and d with w.
     """
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the derivative of z x d (7.85) with respect to a later joint.
+    """Return the derivative of z x d by a later joint (7.85).
 
-    At the joint velocity 1, the later joint moves the end point of d with the velocity `linear`.
+    At joint velocity 1, the end point of d has the velocity `linear`.
     """
     return cross(z, linear)
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the spatial cross product of the Jacobian columns of two joints; joint 1 is the earlier joint.
+    """Return the spatial cross product of two columns.
 
-    In WORLD, the product is the derivative of column 2 with respect to joint 1. In LOCAL, the product is the
-    derivative of column 1 with respect to joint 2.
+    | reference | the product is the derivative of |
+    |---|---|
+    | WORLD | column 2 with respect to the earlier joint 1 |
+    | LOCAL | column 1 with respect to the later joint 2 |
     """
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

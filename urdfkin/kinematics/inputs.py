@@ -28,7 +28,6 @@ _DOUBLE = np.dtype(np.float64)
 
 
 def as_floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return real numbers as a float64 array; NaN and inf are allowed."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
     if _is_masked(value):
@@ -46,14 +45,16 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether any element is masked; `np.asarray` ignores the mask of an array."""
+    """Return whether any element is masked.
+
+    NumPy's `asarray` ignores masks.
+    """
     if is_instance(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def as_finite(value: ArrayLike, name: str) -> FloatArray:
-    """Return finite real numbers as a float64 array of any shape."""
     array = as_floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -61,7 +62,6 @@ def as_finite(value: ArrayLike, name: str) -> FloatArray:
 
 
 def as_vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return finite vectors (..., size) as a float64 array."""
     array = as_finite(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -69,7 +69,6 @@ def as_vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def as_matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return finite matrices (..., rows, columns) as a float64 array."""
     array = as_finite(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -99,9 +98,9 @@ def as_rotations(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotation_defect(R: FloatArray) -> FloatArray:
-    """Return the largest absolute entry of R R^T - I for each matrix R.
+    """Return the largest absolute entry of R R^T - I.
 
-    The result is inf if the determinant is not positive, or if R R^T overflows.
+    A reflection, a singular matrix or an overflow gives inf.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

@@ -51,7 +51,11 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; `kind` determines whether `text` needs brackets inside a larger expression."""
+    """A LaTeX expression.
+
+    Attributes:
+        kind: `_ATOM`, `_CROSS` or `_SUM`.
+    """
 
     text: str
     kind: int = _ATOM
@@ -105,7 +109,7 @@ _latex_equations = bind_equations(
 
 
 def latex(name: str) -> str:
-    r"""Return the LaTeX text of a function of `urdfkin.kinematics.equations`.
+    r"""Return the LaTeX text of an equation's function.
 
     >>> print(latex("point_acceleration"))
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)
@@ -117,7 +121,7 @@ def latex(name: str) -> str:
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX text of one term, of a column of terms, or of a matrix of terms."""
+    """Write a term, column or matrix as LaTeX."""
     if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]

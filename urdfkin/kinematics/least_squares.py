@@ -37,12 +37,12 @@ def least_squares(
     max_step: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Search near `start` for the state with the smallest residuals.
+    """Search near `start` for the smallest residuals.
 
-    The function returns this state and the norm of its residuals. `derivatives` returns the negative
-    derivatives (rows, parameters) of the residuals (rows,). A step is a vector (parameters,). The function
-    rejects a step if the absolute value of a component is more than `max_step`. The iteration ends after
-    `patience` consecutive slow steps; 0 means no limit.
+    The result is the best state and the norm of the residuals.
+    `derivatives` returns the negative derivatives (rows, parameters).
+    No component of a step exceeds `max_step`.
+    The search ends after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

@@ -1,8 +1,16 @@
 """Compute upper bounds on the lengths of a link's position, velocities and accelerations.
 
-Each function computes the bounds of a link from the bounds of the parent link. The bounds of a link's point
-are (p, w, vel, alpha, acc): position, angular and linear velocity, angular and linear acceleration. A bound
-is at least the sum of the norms of all terms that are added to form the quantity.
+Each function computes the bounds of a link from the bounds of the parent link. A bound is at least the sum of
+the norms of all terms:
+
+| Symbol | Vector or number |
+|---|---|
+| p | position |
+| w, vel | angular and linear velocity |
+| alpha, acc | angular and linear acceleration |
+| d | offset of the joint, with the displacement of the joint |
+| o, u | angular and linear joint velocity |
+| o_rate, u_rate | angular and linear joint acceleration |
 
 NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) give the same bits.
 """
@@ -16,28 +24,21 @@ _Z = 1.0  #: Length of a joint's axis.
 
 
 def translate_point(state: LinkBounds, d: Length) -> LinkBounds:
-    """Return the bounds for the link's point at the distance d (7.58, 7.128, 7.130)."""
+    """Return the bounds at the distance d (7.58, 7.128, 7.130)."""
     p, w, vel, alpha, acc = state
     p, vel = eq.point_position(p, None, d), eq.point_velocity(vel, w, d)
     return p, w, vel, alpha, eq.point_acceleration(acc, alpha, w, d)
 
 
 def after_revolute(state: LinkBounds, d: Length, o: Length, o_rate: Length) -> LinkBounds:
-    """Return the bounds of the link after a revolute joint (7.127, 7.129).
-
-    Let d be the length of the joint's offset. Let o be the absolute value of the joint velocity, and let
-    o_rate be the absolute value of the joint acceleration.
-    """
+    """Return the bounds after a revolute joint (7.127, 7.129)."""
     p, w, vel, alpha, acc = translate_point(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
 def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> LinkBounds:
-    """Return the bounds of the link after a prismatic joint (7.128, 7.130).
-
-    The length d includes the joint's displacement.
-    """
+    """Return the bounds after a prismatic joint (7.128, 7.130)."""
     p, w, vel, alpha, acc = translate_point(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
@@ -45,10 +46,7 @@ def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> 
 def after_free_joint(
     state: LinkBounds, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length
 ) -> LinkBounds:
-    """Return the bounds of the link after a planar or floating joint.
-
-    The length d includes the joint's displacement.
-    """
+    """Return the bounds after a planar or floating joint."""
     p, w, vel, alpha, acc = translate_point(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)

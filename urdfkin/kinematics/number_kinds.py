@@ -3,17 +3,23 @@
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.
 
-`length_equations` computes the scale of a result. A result is a sum of terms, and the scale is an upper bound
-on the sum of the absolute values of these terms. Each vector is replaced by its length or by an upper bound
-on its length. A difference becomes a sum, and a cross product becomes the product of two lengths. A rotation
-does not change a length. The scale is at least as large as every term, every partial sum and the result.
-Rounding errors are proportional to the scale. Rounding errors are not proportional to the result, because the
-result is small where large terms cancel.
+`length_equations` computes the scale of a result: an upper bound on the sum of the absolute values of its
+terms. The scale is at least as large as every term, every partial sum and the result. Rounding errors are
+proportional to the scale. The result itself is small where large terms cancel.
 
-A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number. This lower bound has two reasons.
-First, a product below `SMALLEST_NORMAL` has an absolute error of up to half the smallest subnormal number.
-Second, a product of two small numbers may underflow to zero. After a later multiplication by a large number,
-the true product may be large, but the computed product is zero.
+| Result | Scale |
+|---|---|
+| vector | length of the vector, or an upper bound on the length |
+| difference | sum |
+| cross product | product of two lengths |
+| rotated vector | length of the vector |
+
+A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number, for two reasons:
+
+| Product of small numbers | Error |
+|---|---|
+| below `SMALLEST_NORMAL` | up to half the smallest subnormal number |
+| underflow to zero | large, if a later factor is large: the computed product is still zero |
 """
 
 from __future__ import annotations
@@ -43,7 +49,9 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return x y for x, y >= 0; the result is at least `SMALLEST_NORMAL` if neither number is zero.
+    """Return the product x y of two lengths.
+
+    The product of nonzero numbers is at least `SMALLEST_NORMAL`.
 
     >>> product(1e-200, 1e-200) == SMALLEST_NORMAL, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))
@@ -59,7 +67,9 @@ def product(x: Length, y: Length) -> Length:
 
 
 def magnitude(x: FloatArray) -> FloatArray:
-    """Return the absolute values |x|; every value that is not zero is raised to at least `SMALLEST_NORMAL`.
+    """Return the absolute values |x|.
+
+    Every nonzero value becomes at least `SMALLEST_NORMAL`.
 
     >>> magnitude(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
     True
@@ -68,7 +78,10 @@ def magnitude(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n); a length is 0 or at least `SMALLEST_NORMAL`."""
+    """Return the lengths of vectors (..., n).
+
+    A length is 0 or at least `SMALLEST_NORMAL`.
+    """
     return magnitude(
         np.hypot.reduce(x, axis=-1)
     )  # Squares could underflow or overflow, but np.hypot does not.

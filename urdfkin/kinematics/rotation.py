@@ -62,7 +62,7 @@ from urdfkin.kinematics.number_kinds import array_equations as eq
 
 
 def skew(w: ArrayLike) -> FloatArray:
-    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16)."""
+    """Return S(w) with S(w) p = w x p (7.16)."""
     w = as_vectors(w, "w")
     S = np.zeros((*w.shape, 3))
     S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
@@ -71,10 +71,9 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the vector w of a skew-symmetric matrix S(w) (7.26, 7.37).
+    """Return the vector w of S(w) (7.26, 7.37).
 
-    If an entry of the symmetric part of S exceeds `tolerance` times the largest entry of S, the function
-    raises InputError.
+    `tolerance` limits the symmetric part, relative to the largest entry of S.
     """
     S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -88,7 +87,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return S(R w) = R S(w) R^T, which expresses the skew-symmetric matrix S(w) in frame 0 (7.46)."""
+    """Return S(R w) = R S(w) R^T (7.46)."""
     R_0_1 = as_rotations(R_0_1, "R_0_1")
     return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
@@ -98,12 +97,13 @@ ROUNDED = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
-    """Return the rotation that is nearest to a matrix M, up to rounding.
+    """Return the nearest rotation to a rounded rotation matrix.
 
-    M is a rotation matrix whose entries may be rounded to nine decimals. The method is one Newton step
-    (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is
-    3e-9 at most. Therefore, the error of the result is at most 1.4e-17, an eighth of a rounding error
-    (eps/2 = 1.1e-16).
+    M: a rotation matrix whose entries may be rounded to nine decimals
+    result = M - M (M^T M - I)/2, one Newton step (Bjorck and Bowie)
+    M = U (I + E):  result = U (I - 3/2 E^2)
+    |E| <= 3e-9
+    error <= 3/2 |E|^2 <= 1.4e-17, an eighth of eps/2 = 1.1e-16
     """
     M = as_rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
@@ -111,7 +111,9 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant.
+    """Return the nearest rotation.
+
+    The matrix must have a positive determinant.
 
     >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -121,12 +123,15 @@ def polar_factor(M: FloatArray) -> FloatArray:
 
 
 def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
-    """Return a rotation matrix whose third column is `axis`; for the axis z, return the identity.
+    """Return a rotation matrix whose third column is `axis`.
 
-    The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. If the
-    z component of `axis` is not negative, the result is the shortest rotation from z to `axis`. Otherwise,
-    the result is half a turn about x, followed by the shortest rotation from -z to `axis`. For a coordinate
-    axis, the entries are exactly 0 and +-1.
+    | z of `axis` | result |
+    |---|---|
+    | >= 0 | shortest rotation from z to `axis` |
+    | < 0 | half a turn about x, then shortest rotation from -z to `axis` |
+
+    The formula has no singularity (Duff and others, "Building an Orthonormal Basis, Revisited", 2017).
+    For a coordinate axis, the entries are exactly 0 and +-1.
     """
     axis = as_unit_vectors(axis, "axis")
     x, y, z = np.moveaxis(axis, -1, 0)
@@ -139,32 +144,36 @@ def rotation_with_z_axis(axis: ArrayLike) -> FloatArray:
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42)."""
+    """Return R-dot = S(w) R (7.38, 7.42)."""
     return skew(as_vectors(w_0_1, "w_0_1")) @ as_rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the angular velocity w with S(w) = R-dot R^T (7.35 to 7.38).
+    """Return w with S(w) = R-dot R^T (7.35 to 7.38).
 
-    `R_rate` (..., 3, 3) is the time derivative of `R_0_1` in 1/s; `unskew` defines `tolerance`.
+    See `unskew` for `tolerance`.
     """
     R_0_1 = as_rotations(R_0_1, "R_0_1")
     return unskew(as_matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return the time derivative w x p of a vector p that is fixed in frame 1 (7.39 to 7.41).
+    """Return the rate w x p (7.39 to 7.41).
 
-    `p_0` (..., 3) is the vector p, expressed in frame 0.
+    The vector p is fixed in frame 1.
     """
     return np.cross(as_vectors(w_0_1, "w_0_1"), as_vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """Return the angular velocity (..., 3) of frame n relative to frame 0, in frame 0 (7.43 to 7.50).
+    """Add the angular velocities of a chain (7.43 to 7.50).
 
-    Entry i of `Rs` (..., n, 3, 3) is the orientation of frame i + 1 in frame i. Entry i of `ws` (..., n, 3)
-    is the angular velocity of frame i + 1 relative to frame i, in frame i.
+    Args:
+        Rs: (..., n, 3, 3) orientations of frame i + 1 in frame i.
+        ws: (..., n, 3) angular velocities of frame i + 1 in frame i.
+
+    Returns:
+        Angular velocity of frame n in frame 0.
     """
     Rs, ws = as_rotations(Rs, "Rs"), as_vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -185,7 +194,6 @@ NORM_TOLERANCE = 1e-6
 
 
 def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """Normalise quaternions (..., 4) whose norms differ from 1 by at most 1e-6."""
     quat = as_vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     if (np.abs(norms - 1.0) > NORM_TOLERANCE).any():
@@ -196,15 +204,18 @@ def normalise_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 
 def rotation_from_quaternion(quat: ArrayLike) -> FloatArray:
-    """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
+    """Return a unit quaternion's rotation.
+
+    R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q)
+    """
     rows = eq.rotation_of_quaternion(*np.moveaxis(normalise_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """Return the unit quaternion of a rotation, with qw >= 0.
+    """Return the unit quaternion with qw >= 0.
 
-    Shepperd's method divides by the component with the largest absolute value, which avoids cancellation.
+    Shepperd's method avoids cancellation.
     """
     R = as_rotations(R, "R")
     # Each row of K = 4 q q^T is a multiple of q.
@@ -223,7 +234,10 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 
 
 def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
-    """Return the product of two quaternions of any length, with R(left right) = R(left) R(right)."""
+    """Multiply two quaternions of any length.
+
+    R(left right) = R(left) R(right)
+    """
     left, right = as_vectors(left, "left", 4), as_vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
     scalar = p0 * q0 - (p * q).sum(axis=-1, keepdims=True)
@@ -231,7 +245,7 @@ def multiply_quaternions(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate_quaternion(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0); the conjugate of a unit quaternion is the inverse rotation."""
+    """Return the conjugate (-q, q0)."""
     conjugated: FloatArray = as_vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -240,11 +254,11 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
+    """Return E in (q-dot, q0-dot) = E w (7.57).
 
-    For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, E = 1/2 [q0 I + S(q);
-    -q^T]. The columns of E have length 1/2. The columns are perpendicular to each other and to the
-    quaternion.
+    frame="fixed":  E = 1/2 [q0 I - S(q); -q^T]
+    frame="body":   E = 1/2 [q0 I + S(q); -q^T]
+    E^T E = I/4,  E^T (q, q0) = 0
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -256,16 +270,16 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Convert a body's angular velocity w to the time derivative (..., 4) of the body's quaternion (7.57)."""
+    """Return (q-dot, q0-dot) = E w (7.57)."""
     return (quaternion_rate_matrix(quat, frame) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def angular_velocity_from_quaternion_rates(
     quat: ArrayLike, rates: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Return the angular velocity w = 4 E^T (q-dot, q0-dot), which solves equation 7.57 for w.
+    """Return w = 4 E^T (q-dot, q0-dot) (7.57).
 
-    Rates that are parallel to the quaternion change only the quaternion's length. E^T maps such rates to 0.
+    Rates parallel to the quaternion give w = 0.
     """
     E = quaternion_rate_matrix(quat, frame)
     return 4.0 * (E.swapaxes(-1, -2) @ as_vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
@@ -274,11 +288,10 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 by the fourth-order Runge-Kutta method; return quaternions (n, ..., 4).
+    """Integrate 7.57 by the fourth-order Runge-Kutta method.
 
-    `w` returns the angular velocity (..., 3) at a time in s. `quat` is the orientation at the first of the n
-    increasing `times`. If the angular velocity jumps, `times` must contain the time of the jump, because `w`
-    must be smooth within a step. At both ends of a step, `w` is evaluated slightly inside the step.
+    A jump of `w` must be at one of the increasing `times`.
+    Each step therefore evaluates `w` slightly inside the step.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -309,14 +322,17 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length; equation 7.57 is linear in the quaternion."""
+    """Extend 7.57 to quaternions of any length."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28)."""
+    """Return Rodrigues' rotation (7.28).
+
+    R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi)
+    """
     axis = as_unit_vectors(axis, "axis")
     angle = as_finite(angle, "angle")[..., np.newaxis, np.newaxis]
     # This formula of 1 - cos(phi) has no cancellation for small phi.
@@ -326,29 +342,29 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.29, 7.33)."""
+    """Return dR_k(phi)/dphi = S(k) R_k(phi) (7.29, 7.33)."""
     return skew(axis) @ rotation_about(axis, angle)
 
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
+    """Return w = phi-dot k (7.12, 7.34)."""
     return as_finite(rate, "rate")[..., np.newaxis] * as_unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about the axis k (7.21)."""
+    """Return the velocity phi-dot k x p (7.21)."""
     return np.cross(angular_velocity_about(axis, rate), as_vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the components of p parallel and perpendicular to the axis k (7.18)."""
+    """Split p along and perpendicular to k (7.18)."""
     axis, p = as_unit_vectors(axis, "axis"), as_vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation of the rotation vector phi k; the angle phi may be 0."""
+    """Return the rotation matrix of a rotation vector."""
     vector = as_vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
@@ -359,7 +375,10 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """Return the rotation vector phi k, with phi in [0, pi]; for phi = pi, k may have either sign."""
+    """Return the rotation vector phi k.
+
+    The angle is in [0, pi]. For the angle pi, k may have either sign.
+    """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
@@ -370,7 +389,10 @@ def log_rotation(R: ArrayLike) -> FloatArray:
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axis k and the angle phi in [0, pi]; for the identity, the axis is z."""
+    """Return the axis and the angle.
+
+    The angle is in [0, pi]. The identity has the axis z.
+    """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
     sine = np.sqrt((vector * vector).sum(axis=-1))
@@ -387,12 +409,14 @@ EULER_SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 @dataclass(frozen=True, slots=True)
 class EulerSequence:
-    """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
+    """The axes of an Euler sequence.
 
-    The axes `first`, `second` and `third` turn with the body. The axis `other` is neither the first nor the
-    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `is_fixed` is True, the
-    letters of `name` are axes that are fixed in space. The order of these letters is the reverse of `first`,
-    `second`, `third`.
+    | field | meaning |
+    |---|---|
+    | `first`, `second`, `third` | axes that turn with the body: 0 is x, 1 is y, 2 is z |
+    | `other` | neither the first nor the second axis |
+    | `sign` | +1 if (first, second, other) is right-handed, else -1 |
+    | `is_fixed` | the letters of `name` are fixed axes, in the order third, second, first |
     """
 
     name: str
@@ -405,11 +429,10 @@ class EulerSequence:
 
     @property
     def is_proper(self) -> bool:
-        """Whether the first and the third axis are the same, as in ZYZ."""
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Convert values from the order of the letters in `name` to the order of the body's axes, or back."""
+        """Reverse the values for fixed axes."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -430,7 +453,10 @@ def _make_sequence(name: str) -> EulerSequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return Rx, Ry or Rz (axis 0, 1 or 2); its constant entries are exactly 0 and 1."""
+    """Return Rx, Ry or Rz.
+
+    The constant entries are exactly 0 and 1.
+    """
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -442,7 +468,10 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 
 
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ"."""
+    """Return the rotation of Euler angles.
+
+    R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
+    """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))
     product: FloatArray = (
@@ -456,10 +485,13 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
     """Return the Euler angles of a rotation.
 
-    The middle angle is in [0, pi] for a proper sequence such as ZYZ and in [-pi/2, pi/2] for the others. At
-    the representational singularity, only the sum or the difference of the first and the third angle is
-    determined. The third angle is computed from the first angle, so that the product of the three rotations
-    is correct.
+    | sequence | middle angle |
+    |---|---|
+    | proper, such as ZYZ | [0, pi] |
+    | other | [-pi/2, pi/2] |
+
+    At the singularity, only the sum or difference of two angles is determined.
+    The third angle then follows from the first angle.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.
@@ -481,12 +513,15 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the rotation of the URDF's `rpy`."""
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll)."""
     return rotation_from_euler("xyz", rpy)
 
 
 def rpy_of(R: ArrayLike) -> FloatArray:
-    """Return roll, pitch and yaw of a rotation; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly."""
+    """Return roll, pitch and yaw.
+
+    The yaw is 0 if R[0, 0] = R[1, 0] = 0.
+    """
     return euler_of("xyz", R)
 
 
@@ -495,9 +530,9 @@ NEAREST = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the matrix Omega (..., 3, 3) in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
+    """Return Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns of Omega are the axes of the three rotations, in frame 0.
+    The columns are the rotation axes in frame 0.
     """
     axes = find_sequence(name)
     turns = axes.reorder(as_vectors(angles, "angles"))
@@ -509,24 +544,26 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
+    """Return w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
     product = euler_rate_matrix(name, angles) @ as_vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Convert a body's angular velocity w to the rates Omega^-1 w of the body's Euler angles (7.56)."""
+    """Return the Euler angle rates Omega^-1 w (7.56)."""
     return (euler_rate_inverse(name, angles, nearest) @ as_vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the matrix Omega^-1 (..., 3, 3) in closed form, from the geometry of the axes (7.56).
+    """Return Omega^-1 in closed form (7.56).
 
-    The method expresses w in the frame after the first rotation. In this frame, the first and the second axis
-    are coordinate axes. The third axis has no component along the second axis. The component of w along the
-    axis `other` gives the rate of the third angle. The component of w along the second axis is the rate of
-    the second angle. The component of w along the first axis and the rate of the third angle give the rate of
-    the first angle.
+    F:              rotation by the first angle
+    w' = F^T w:     w in the frame after F
+    r_1, r_2, r_3:  rates of the three angles
+    w' = r_1 e_first + r_2 e_second + r_3 (along e_first + across e_other)
+    r_3 = w'_other / across
+    r_2 = w'_second
+    r_1 = w'_first - along r_3
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
@@ -549,11 +586,14 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
 
 
 def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the distance (rad) between the middle Euler angle and the singularity, called gimbal lock.
+    """Return the middle angle's distance from the singularity.
 
-    The distance is in [0, pi/2]. A proper Euler sequence such as ZYZ is singular if the middle angle is a
-    multiple of pi. Of these singular angles, the textbook mentions only the angle 0. The other sequences are
-    singular if the middle angle is an odd multiple of pi/2.
+    | sequence | singular middle angles |
+    |---|---|
+    | proper, such as ZYZ | multiples of pi; the textbook mentions only 0 |
+    | other | odd multiples of pi/2 |
+
+    The distance is in [0, pi/2], rad.
     """
     middle = as_vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
@@ -561,12 +601,13 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega: 1 if the three rotation axes are perpendicular to each other.
+    """Return the condition number of Omega.
 
-    The middle axis is perpendicular to the first and to the third axis. Let d <= pi/2 be the angle between
-    the lines of the first and the third axis. Then Omega has the singular values 1 and sqrt(1 +- cos d). The
-    condition number of Omega is cot(d / 2). At the singularity, the function raises
-    RepresentationSingularityError.
+    The second axis is perpendicular to the first and third axis.
+    Let d <= pi/2 be the angle between the lines of the first and third axis.
+
+        singular values of Omega:  1, sqrt(1 + cos d), sqrt(1 - cos d)
+        condition number:          cot(d/2)
     """
     angles = as_vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

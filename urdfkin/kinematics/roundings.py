@@ -1,15 +1,25 @@
 """Bounds on the difference that rounding errors cause between two correct computations.
 
-All tolerances of urdfkin use these bounds. The unit of an error is eps = 2^-52 times the rounded number. Each
-operation has an error of at most half an eps. Errors are counted to first order. A tolerance is `count * eps
-* scale`. A result is a sum of terms. The scale of the result is an upper bound on the sum of the absolute
-values of these terms (`urdfkin.kinematics.number_kinds`). This module defines the counts.
-`urdfkin.verify.bounds` computes the scales for the forward recursion. The modules of `urdfkin.dh` compute the
-scales for Denavit-Hartenberg tables.
+All tolerances of urdfkin use these bounds:
 
-**A joint.** For each joint, the recursion multiplies the rotation of the previous link by two rotations. The
-first rotation is the joint's constant rotation. The second rotation is the joint's motion about its axis. If
-*all* rounding errors have the same sign, the error of a component of a rotated vector grows for each joint by
+    tolerance = count * eps * scale
+    eps = 2^-52
+    error of one operation <= eps/2 times the rounded number
+    scale = upper bound on the sum of the absolute values of the result's terms
+
+This module defines the counts, to first order in eps.
+
+| Scale | Module |
+|---|---|
+| definition | `urdfkin.kinematics.number_kinds` |
+| forward recursion | `urdfkin.verify.bounds` |
+| Denavit-Hartenberg tables | modules of `urdfkin.dh` |
+
+**A joint.** For each joint, the recursion multiplies the rotation of the previous link by two rotations:
+
+    R_i = R_{i-1} (constant rotation of joint i) (rotation about the axis of joint i)
+
+If *all* rounding errors have the same sign, each joint increases the error of a vector's component by
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -17,52 +27,63 @@ first rotation is the joint's constant rotation. The second rotation is the join
 | rotation about the axis, with its sine and cosine | 1.5 | 1.7 |
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
+| for comparison: sum of the first three rows | 6.1 | 16.0 |
+| cause of the difference | worst cases do not occur together | rotations add errors of several components |
+| urdfkin and Pinocchio, with opposite signs | 5.7 + 16.8 = 22.5 | |
 
-The last row is computed for the whole joint, and is not the sum of the first three rows. For urdfkin, the
-three rows sum to 6.1. The error of the whole joint is smaller, because the worst cases of the three rows do
-not occur together. For Pinocchio, the three rows sum to 16.0. The error of the whole joint is larger, because
-a rotation adds the errors of several components. The errors of urdfkin and of Pinocchio may have opposite
-signs, so the bound for the difference is 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes the
-counts of the table. The test evaluates the equations with objects that act as numbers and record each
-rounding error.
+`tests/kinematics/test_roundings.py` computes the first four rows.
 
-For example, the acceleration of a frame is a sum of terms such as w x (w x d). This term has the three
-factors w, w and d. The cross products in a term cause further rounding errors. The addition of the terms
-causes rounding errors as well. In each implementation, these further errors sum to at most 2 eps for each
-term. A term has two or three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the
-tolerance is computed for a path with one additional joint. The margin of the additional joint covers the
-error of the frame's own offset and the error of the first sum. Second, `PINOCCHIO_ROUNDINGS` is 24, which is
-1.5 more than 22.5. The margin of 1.5 covers the errors of all other sums.
+| Sum or product in a term, for example in the acceleration's term w x (w x d) | |
+|---|---|
+| factors of a term (`urdfkin.verify.bounds`) | two or three; here w, w and d |
+| errors of cross products and sums, in each implementation | at most 2 for each term |
+| first margin: one additional joint | for the frame's own offset and the first sum |
+| second margin: `PINOCCHIO_ROUNDINGS` = 24 = 22.5 + 1.5 | for all other sums |
 
-The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
-rotates the axis z and the offset R d of every later joint once. In a link's axes, the inverse rotation of
-each joint before link k multiplies the angular velocity w of link k. A term of link k, such as w x (w x d),
-is multiplied by the rotation of each joint between link k and the frame. Finally this term is multiplied once
-by R, the product of all rotations. For w x (w x d), the number of rotations is at most three times the number
-of joints of the path. This limit holds in the world's axes and in a link's axes.
+| Axes of the recursion's vectors | Vector | Rotations of the vector |
+|---|---|---|
+| world | z and R d of a joint | once by each earlier joint |
+| link | w of link k | by the inverse rotation of each joint before link k |
+| link | a term of link k | by each joint between link k and the frame, and once by R, the product of all |
+| both | w x (w x d) | at most three times the number of joints on the path |
 
-If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. Let
-R_i be the constant rotation of joint i, and let A_i be the rotation that turns z to the axis of joint i.
-urdfkin computes A_{i-1}^-1 R_i A_i. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
-result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
-41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over
-its range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times
-this standard deviation.
+If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products:
 
-Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
-that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
-2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. The bound 2 t holds for all vectors after this joint. Therefore, the allowed difference of each
-factor of a term increases by 2 t. In units of eps, this increase is 2 t / eps. The increase applies to all
-frames after the joint. If a tilt is larger than eps, urdfkin reports the finding URDF514.
+| | |
+|---|---|
+| constant rotation of joint i | R_i |
+| rotation that turns z to the axis of joint i | A_i |
+| computation of urdfkin | A_{i-1}^-1 R_i A_i |
+| computation of Pinocchio | Rodrigues' formula |
+| length of the axis | changes both results |
 
-**An export.** Exported code (`urdfkin.export`) computes the same equations, but omits multiplications by 0
-and by 1. An export also omits small constants. An entry of a constant rotation matrix is small if the entry
-is less than half an eps of the largest entry in the same row. A component of an offset is small if the
-component is less than half an eps of the largest component. Each omission causes an error of half an eps, but
-the rounding errors of one product and one sum disappear. The compiler decides whether products and sums are
-fused. An export uses the sine and cosine of a library. Only batches in C use polynomials with an error of one
-eps; three subtractions reduce the polynomials' angle.
+| Errors of a single joint | Count |
+|---|---|
+| all 340 rounding errors with the same sign; more than `PINOCCHIO_ROUNDINGS` | 41 |
+| standard deviation of uniformly distributed rounding errors | 3.3 |
+| `PINOCCHIO_ROUNDINGS`, seven times this standard deviation | 24 |
+
+Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis:
+
+    Q: rotation that turns the file's axis to the coordinate axis
+    t: angle of Q, the tilt
+    |Q R Q^T - R| <= 2 |Q - 1| <= 2 t
+    error of a rotated vector, or of a translation along the axis <= 2 t
+    additional error of each factor, for all frames after the joint = 2 t = (2 t / eps) eps
+
+If t > eps, urdfkin reports the finding URDF514.
+
+**An export.** Exported code (`urdfkin.export`) computes the same equations, with these changes:
+
+| Number in exported code | Change |
+|---|---|
+| product with 0 or 1 | omitted |
+| entry of a constant rotation, less than half an eps of the largest entry in its row | omitted |
+| component of an offset, less than half an eps of the largest component | omitted |
+| each omission | error of 0.5, but one product and one sum are not rounded |
+| product and sum | fused or not, as the compiler decides |
+| sine and cosine | from a library; in C's batches from polynomials with an error of 1 |
+| angle of the polynomials | reduced by three subtractions |
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -81,19 +102,27 @@ The counts of an export's joint are
 | rotation about the axis, with such a sine and cosine | 2.5 | 2.6 |
 | all of an export's joint | 6.5 | 7.2 |
 
-Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
-offset's length. In matrix rows and cross products, an export omits each product that contains an omitted
-component. The error of this omission is smaller than 1.5, the count of a product in the table. Without fused
-multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint. The errors of
-the sums over the joints are added to this difference. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these
-sums. The standard deviation of the error is the same for an export and for urdfkin. Test vectors contain true
-values. Therefore, the difference between an export and test vectors is at most 7.2 eps. This difference is
-within `PINOCCHIO_ROUNDINGS`.
+| Omission in an export | Error |
+|---|---|
+| one component of an offset | 0.5 |
+| two components of an offset | 0.7, in multiples of the offset's length |
+| products with an omitted component, in matrix rows and cross products | below 1.5, as in the first row |
 
-**Single precision.** An export in single precision has a separate bound for each number of a test vector. The
-unit is eps = 2^-23. The value x of each operation and of each constant has a rounding error.
-`urdfkin.export.function` multiplies this rounding error by the derivative of the result with respect to x.
-The bound is the sum of the absolute values of these products for all x. The error of one operation is
+| Difference of an export, not fused | At most, for each joint |
+|---|---|
+| from Pinocchio, without the sums over the joints | 7.2 + 16.8 = 24.0 |
+| `PINOCCHIO_ROUNDINGS`, which does not cover these sums | 24.0 |
+| from test vectors, which contain true values | 7.2, within `PINOCCHIO_ROUNDINGS` |
+
+The errors of an export and of urdfkin have the same standard deviation.
+
+**Single precision.** `urdfkin.export.function` computes a bound for each number of a test vector:
+
+    eps = 2^-23
+    x: value of an operation or of a constant
+    bound = sum over all x of (rounding error of x) * |derivative of the result with respect to x|
+
+The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -102,39 +131,56 @@ The bound is the sum of the absolute values of these products for all x. The err
 | a quotient, a square root; a compiler may write x / sqrt(y) as x rsqrt(y), with 1 for rsqrt and 0.5 | 1.0 |
 | sine and cosine of a library: 3.5 units in the last place (SLEEF, used by PyTorch); CUDA has 2 | 3.5 |
 | sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
+| a change of sign | 0 |
+| an input of a test vector, stored in single precision | 0 |
 
-A change of sign has no error. The inputs of a test vector are stored as single-precision numbers, so they
-have no rounding error. GPUs and some compilers replace a number below the smallest normal number, 2^-126, by
-0. Therefore, the error of such a number is at most 2^-126. The constants also have the rounding errors of the
-export in double precision. The factor 2^-52 / 2^-23 converts the bound on these errors to the unit of single
-precision. The converted bound is added to the bound of single precision. An export contains only the
-operations of the table, so this section counts all errors.
+| Other errors | |
+|---|---|
+| number below the smallest normal number, 2^-126; GPUs and some compilers replace it by 0 | at most 2^-126 |
+| constants: bound of the export in double precision | added, times 2^-52 / 2^-23 |
 
-**MuJoCo.** The optional second oracle computes the orientation as a unit quaternion. For each joint, MuJoCo
-normalises the joint's axis. MuJoCo then multiplies the quaternion by the quaternion of the constant rotation
-and by the quaternion of the joint's rotation. At each link, MuJoCo normalises the quaternion and converts it
-to a matrix. If all rounding errors have the same sign, the error is
+An export contains no other operations.
+
+**MuJoCo.** The optional second oracle computes the orientation as a unit quaternion:
+
+| At | MuJoCo's operations |
+|---|---|
+| each joint | normalises the axis |
+| each joint | multiplies by the quaternions of the constant rotation and of the joint's rotation |
+| each link | normalises the quaternion, and converts it to a matrix |
+
+If all rounding errors have the same sign, the error is
 
 | | MuJoCo |
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
+| with urdfkin's error | 21.5 + 5.7 = 27.2 |
+| `MUJOCO_ROUNDINGS`, with a margin for the sums over the joints | 27.2 + 2.8 = 30 |
 
-Together with urdfkin's error of 5.7, the bound for the difference is 27.2. `MUJOCO_ROUNDINGS` is 30, which is
-2.8 more than 27.2. The margin of 2.8 covers the errors of the sums over the joints. MuJoCo does not replace
-the file's axes by coordinate axes.
+MuJoCo does not replace the file's axes by coordinate axes.
 
-**Mimic joints.** A mimic joint adds no rounding error. The angle of a mimic joint is m q + c. urdfkin and the
-oracle compute this angle from the same doubles m and c. Both programs round the multiplication and then the
-addition, so IEEE 754 defines the result to the last bit. If a mimic joint mimics another mimic joint, urdfkin
-and the oracle combine the rules in the same order. Both programs start with the rule that refers to the
-independent joint. The first table above contains the errors of sine and cosine. The functions sine and
-cosine first subtract multiples of pi/2 from the angle. This subtraction is exact for every angle, even for
-1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
+**Mimic joints.** A mimic joint adds no rounding error:
 
-**A base.** `urdfkin.BaseMotion` gives the robot's root link a pose in the world. A base with a rotation M
-counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
-user's matrix M have at least nine correct decimals. urdfkin and Pinocchio replace M by the nearest rotation,
-with different methods. Therefore, the error does not depend on the distance of M from the nearest rotation.
+| | |
+|---|---|
+| angle of a mimic joint | m q + c, from the same doubles m and c in urdfkin and in the oracle |
+| product and sum | rounded in this order, so IEEE 754 defines each bit |
+| rule that refers to another mimic joint | combined in the same order, from the independent joint on |
+| sine and cosine | errors in the first table above |
+| subtraction of multiples of pi/2 from the angle | exact for every angle, even for 1e12 rad |
+
+The checks therefore detect every mistake in a mimic joint's angle.
+
+**A base.** `urdfkin.BaseMotion` gives the robot's root link a pose in the world:
+
+| | |
+|---|---|
+| base with a rotation M | counts as one more joint of the path |
+| base without a rotation | does not change the count |
+| entries of the user's M | have at least nine correct decimals |
+| nearest rotation to M | replaces M, by different methods in urdfkin and in Pinocchio |
+| distance of M from this rotation | does not change the error |
+
 The counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
@@ -146,12 +192,14 @@ The counts, with u = eps/2, are
 | the quaternion's matrix | | 3.0 |
 | a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
 | sum | 3.2 | 17.0 |
+| sum of both, within `PINOCCHIO_ROUNDINGS` | 20.2 | |
+| largest measured errors; 1,500 matrices, reference values with 50 digits | 0.6 | 5.1 |
 
-The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 for urdfkin
-and 5.1 for Pinocchio. The measurement used 1,500 matrices and reference values with 50 digits.
+**MJCF equalities.** The tree's mimic rules satisfy an equality in an MJCF file up to rounding:
 
-**MJCF equalities.** An equality in an MJCF file is y - y0 = c0 + c1 (x - x0). Here x and y are the values of
-two joints, with the reference values x0 and y0. The tree's mimic rules satisfy the equality up to
+    equality: y - y0 = c0 + c1 (x - x0)
+    x, y: values of two joints
+    x0, y0: reference values
 
 | | |
 |---|---|
@@ -159,18 +207,20 @@ two joints, with the reference values x0 and y0. The tree's mimic rules satisfy 
 | a rule that refers to a mimic joint: two products and a sum | 1.5 |
 | x and y by their rules, m q + c | 2.0 |
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
-| sum | 7.5 |
+| sum, at most `MJCF_RULE_ROUNDINGS` = 8 | 7.5 |
 
-The tolerance is this sum, multiplied by the size of all terms in the table and by k + 1. Here k is the number
-of mimic rules between the mimic joint and the independent joint.
+    tolerance = MJCF_RULE_ROUNDINGS * eps * (size of all terms in the table) * (k + 1)
+    k: number of mimic rules between the mimic joint and the independent joint
 
-**Numbers near zero.** A product below the smallest normal number loses bits. The error of such a product is
-at most 2^-1075. This number is half the smallest subnormal number, or (eps/2) times the smallest normal
-number. Therefore, every scale except 0 is at least the smallest normal number
-(`urdfkin.kinematics.number_kinds`). With this scale, the tolerance `count * eps * scale` is larger than the
-error 2^-1075. If a later operation multiplies the product by a large number, the error and the scale grow by
-the same factor. The tolerance is therefore still large enough. The smallest unit is eps times the smallest
-normal number, 2^-1074.
+**Numbers near zero.** A product below the smallest normal number loses bits:
+
+    n = smallest normal number
+    smallest subnormal number = eps n = 2^-1074
+    error of the product <= eps n / 2 = 2^-1075
+    every scale except 0 >= n (`urdfkin.kinematics.number_kinds`)
+    tolerance = count * eps * scale >= count * eps n > 2^-1075
+
+A later product with a large number multiplies the error and the scale by the same factor.
 
 **A row** of a Denavit-Hartenberg table has an error of at most 8:
 
@@ -285,11 +335,12 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (in eps) between urdfkin and Pinocchio for a term with one factor.
+    """Return the allowed difference for a single factor.
 
-    For a term with several factors, the allowed difference is multiplied by the number of factors. For
-    example, the term w x (w x d) has three factors. `joints` is the number of joints on the path. `tilt` is
-    the sum over these joints of the angle (radians) between Pinocchio's axis and the file's axis.
+    `tilt` is the sum of the joints' tilts, rad.
+
+    Returns:
+        Difference between urdfkin and Pinocchio, eps.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
@@ -298,25 +349,37 @@ def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def table_roundings(rows: int) -> float:
-    """Return the rounding error (in eps) of a pose that is computed from a table with `rows` rows and a tool.
+    """Return the error of a table's pose.
 
-    The rounding of the joint values, half an eps, is not included.
+    Returns:
+        Error without rounded joint values, eps.
     """
     return ROW_ROUNDINGS * (rows + 1)
 
 
 def read_back_roundings(rows: int) -> float:
-    """Return the allowed difference (in eps) between a table and the URDF that was written from the table.
+    """Return the allowed difference between table and URDF.
 
-    The table's pose has the error `table_roundings(rows)`. Pinocchio's pose of the URDF has the same error.
-    The conversion to roll, pitch and yaw has twice this error.
+    The URDF was written from the table:
+
+    | Error | Multiple of `table_roundings(rows)` |
+    |---|---|
+    | pose of the table | 1 |
+    | Pinocchio's pose of the URDF | 1 |
+    | conversion to roll, pitch and yaw | 2 |
+
+    Returns:
+        Difference in eps.
     """
     return 4.0 * table_roundings(rows)
 
 
 def fit_roundings(rows: int) -> float:
-    """Return the allowed difference (in eps) between a URDF and a table that was fitted to the URDF.
+    """Return the allowed difference between URDF and fitted table.
 
-    The fit is iterative. After the last iteration, the error can be up to 12.5 times `table_roundings(rows)`.
+    After the last iteration of the fit, the error is at most 12.5 * table_roundings(rows).
+
+    Returns:
+        Difference in eps.
     """
     return 12.5 * table_roundings(rows)

@@ -16,14 +16,13 @@ from urdfkin.model.tree import FloatArray, freeze
 class BaseMotion:
     """Motion of the robot's root link relative to the world.
 
-    In the textbook, the world frame has the number -1. Every field may have leading batch axes, which
+    In the textbook, the world frame has the number -1. Every field may have leading batch axes. These axes
     broadcast with the batch axes of the configuration. The fields store the given numbers unchanged, because
     a verification computes Pinocchio's input from these numbers.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals; the
-            computation uses the nearest exact rotation matrix
-            (`urdfkin.kinematics.rotation.nearest_rotation`).
+        placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals. The results
+            use the nearest exact rotation matrix (`urdfkin.kinematics.rotation.nearest_rotation`).
         velocity: (..., 6) velocity of the base's origin, [linear; angular], in world axes, m/s and rad/s.
         acceleration: (..., 6) classical acceleration, [linear; angular], in world axes, m/s^2 and rad/s^2.
 
@@ -78,7 +77,10 @@ class BaseMotion:
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; n is 1 if no field has batch axes.
+        """Return the rows [R, p, w, v, alpha, a] for the kernels.
+
+        Returns:
+            (n, 24) rows; n is 1 if no field has batch axes.
 
         >>> BaseMotion().state(()).shape
         (1, 24)
@@ -102,10 +104,13 @@ FIXED_BASE_STATE = freeze(FIXED_BASE.state(()))
 
 
 def subtract_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
-    """Subtract the gravity vector from the linear acceleration in each state of the base.
+    """Subtract gravity from the base's linear acceleration.
 
-    `state` has the shape (1, 24) or (n, 24). `gravity` has the shape (3,) and the unit m/s^2. The readings of
-    an accelerometer do not change if gravity is replaced by an acceleration of the base.
+    An accelerometer cannot distinguish gravity from an acceleration.
+
+    Args:
+        state: (n, 24) rows of `BaseMotion.state`.
+        gravity: (3,) vector, m/s^2.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

@@ -44,13 +44,10 @@ class ChainJoint:
     """One moving joint on a path.
 
     Attributes:
-        backwards: Whether the path passes the joint from the joint's child link to its parent link.
-        T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
-            frame is the joint's axis. If `backwards` is true, the z axis has the opposite direction. The pose
-            is relative to the previous joint's frame after the previous joint's motion. The pose of the first
-            joint is relative to the base.
-        limit: None if the joint has no limits.
-        mimic: None if the joint has its own coordinate.
+        backwards: Whether the path leads from child to parent.
+        T_previous_joint: (4, 4) constant A_{i-1} of `FrameChain`. Its z axis is the joint's axis. If
+            `backwards` is true, z has the opposite direction.
+        mimic: None for an independent joint.
     """
 
     name: str
@@ -63,21 +60,22 @@ class ChainJoint:
 
 @dataclass(frozen=True, repr=False)
 class FrameChain(Displayable):
-    """The moving joints on the path from base to tip, and the constant poses between these joints.
+    """The moving joints from base to tip, and the constant poses between them.
 
-    Placement:  T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n. The constants are A_{i-1} =
-    `joints[i-1].T_previous_joint` and A_n = `T_last_tip`; M_i is a rotation about z or a translation along z.
+        T_base_tip(q) = A_0 M_1(q_1) A_1 M_2(q_2) ... M_n(q_n) A_n.
+
+    The constant A_{i-1} is `joints[i-1].T_previous_joint`, and A_n is `T_last_tip`. M_i is a rotation about z
+    or a translation along z.
 
     Attributes:
         robot: The robot's name.
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
-        lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
-            an upper bound on the length of the translation in A_k, for any rotations of the fixed joints.
-        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed
-            joints.
+        T_last_tip: (4, 4) pose of the tip in the last joint's frame. Without joints, the pose in the base.
+        lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
+            upper bound on the translation in A_k. The bound holds for any rotations of the fixed joints.
+        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -138,7 +136,7 @@ class FrameChain(Displayable):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the path's coordinates, in the order that `placement` expects.
+        """Names of the path's coordinates, in the order of `q`.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -160,7 +158,9 @@ class FrameChain(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The product A_0 M_1 A_1 ... M_n A_n as a `Path`, whose amounts are the joint values.
+        """The product A_0 M_1 A_1 ... M_n A_n as a `Path`.
+
+        The amounts of the `Path` are the joint values.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -172,7 +172,7 @@ class FrameChain(Displayable):
 
     @cached_property
     def reach(self) -> float:
-        """Sum (m) of the lengths of the constant offsets from the first joint to the tip.
+        """Sum of the path lengths from the first joint to the tip, m.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -182,12 +182,15 @@ class FrameChain(Displayable):
         return float(self.lengths[1:].sum())
 
     def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the poses (..., n + 1, 4, 4) of all joint frames and of the tip in the base frame.
+        """Return the poses of all joint frames and of the tip.
 
         Each joint frame is the frame before the joint's motion.
 
         Args:
             q: (..., coordinates), ordered as `joint_names`; None for the zero configuration.
+
+        Returns:
+            (..., n + 1, 4, 4) poses in the base frame.
 
         Raises:
             InputError: `q` has the wrong length.
@@ -201,7 +204,9 @@ class FrameChain(Displayable):
         return self.path.frames(values)[..., ::2, :, :]
 
     def placement(self, q: ConfigurationLike) -> FloatArray:
-        """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length.
+        """Return the pose T_base_tip (..., 4, 4) for `q` (..., coordinates).
+
+        A wrong length of `q` raises InputError.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -211,7 +216,9 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
     def axes(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration.
+        """Return the unit axes z_{i-1} (..., n, 3) in the base frame.
+
+        Without `q`, the configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -221,7 +228,9 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin.
+        """Return the joint origins (..., n + 1, 3) in the base frame, m.
+
+        The last origin is the tip's origin. Without `q`, the configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -231,7 +240,10 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
     def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip.
+        """Return the interorigin vectors (..., n, 3) in the base frame, m.
+
+        The vector d_{i-1,i} leads from O_{i-1} to O_i. The last vector leads to the tip. Without `q`, the
+        configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -242,7 +254,6 @@ class FrameChain(Displayable):
 
 
 def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """Return the path from `base` to `tip`; a planar or floating joint on the path raises InputError."""
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, pose_counts, count = list[float](), list[int](), 0
@@ -265,7 +276,11 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
 
 
 def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """Return each joint from `base` to `tip`, with True if the path passes the joint from child to parent."""
+    """Return the joints from `base` to `tip`.
+
+    Returns:
+        Pairs (joint, whether the path leads from child to parent).
+    """
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
     while common < min(len(up), len(down)) and up[common] == down[common]:
@@ -275,10 +290,7 @@ def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint
 
 
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the constant pose before a joint's motion and the constant pose after the motion.
-
-    The joint moves about or along z. The direction of the path determines the order.
-    """
+    """Return the constant poses before and after the motion."""
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = pose(rotation_with_z_axis(-joint.axis if backwards else joint.axis))

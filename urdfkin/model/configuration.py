@@ -52,20 +52,18 @@ from urdfkin.model.tree import (
 #: Some upper bounds assume this travel (m) of joints without limits:
 #: planar, floating, and prismatic joints.
 #: Few linear axes of robots are longer than 10 m.
-#: Such a bound also holds for a shorter travel.
+#: These upper bounds also hold for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: Text of the condition of such an upper bound.
+#: Condition of these upper bounds, as text.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
 @dataclass(frozen=True, slots=True)
 class RangeReduction:
-    """The range of a mimicked joint, and the smaller range that the limits of the mimic joints allow.
+    """A mimicked joint's range, which the limits of mimic joints narrow.
 
     Attributes:
-        allowed_range: The part of `joint_range` in which all mimic joints are within their limits. None if
-            this part contains at most one value.
-        mimic_joints: Names of the mimic joints whose limits make the range smaller.
+        allowed_range: None if mimic joints allow at most one value.
     """
 
     joint: str
@@ -84,7 +82,7 @@ class RangeReduction:
 
 
 def format_range(ends: tuple[float, float]) -> str:
-    """Return the two ends of a range as text.
+    """Return a range as text.
 
     >>> format_range((-0.005, 0.055))
     '-0.005 to 0.055'
@@ -93,25 +91,27 @@ def format_range(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
-    """Return the ends of a joint's range; without limits, +-pi (rad) or +-`ASSUMED_LIMIT` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
     return (-math.pi, math.pi) if kind.turns else (-ASSUMED_LIMIT, ASSUMED_LIMIT)
 
 
 def largest_value(limit: Limit | None) -> float:
-    """Return the largest absolute value (rad or m) within limits; `ASSUMED_LIMIT` without limits."""
     return max(abs(limit.lower), abs(limit.upper)) if is_bounded(limit) else ASSUMED_LIMIT
 
 
 def sample_uniform(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
-    """Return uniform random values (count, ranges) in the given ranges (lower, upper)."""
+    """Draw uniform random values.
+
+    Returns:
+        (count, ranges) values.
+    """
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
 def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with one coordinate; ignore the limits of mimic joints."""
+    """Return the ranges of joints with one coordinate; ignore limits of mimic joints."""
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
@@ -125,9 +125,9 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return `joint_ranges`, narrowed so that all mimic joints are within their limits.
+    """Return the joint ranges within the limits of mimic joints.
 
-    A range is not narrowed if the mimic joints allow at most one value.
+    If mimic joints allow at most one value, the range is not narrowed.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -158,10 +158,9 @@ def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
 
 
 def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
-    """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
+    """Return the part of a range that a mimic joint's limits allow.
 
-    `lower` and `upper` are the ends of the mimicked joint's range. If the limits of the mimic joint allow no
-    value of this range, the returned lower end is above the returned upper end.
+    If no value is allowed, the lower end exceeds the upper end.
     """
     least, most = _widen_limits(limit)
 
@@ -187,7 +186,10 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
 
 
 def _widen_limits(limit: Limit) -> tuple[float, float]:
-    """Widen the limits by one unit in the last place, because parsing rounds a decimal limit."""
+    """Widen limits by one unit in the last place.
+
+    Parsing rounds a decimal limit.
+    """
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
@@ -208,7 +210,6 @@ _VELOCITY_SUFFIXES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return the names of the numbers of `q`, with suffixes such as `.x` for a floating joint."""
     return tuple(name for name, _ in _names_and_units(tree, _Q_SUFFIXES))
 
 
@@ -235,7 +236,10 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
-    """Return the unit of each number of q, v or a: "rad", "m" or ""; the time unit is omitted."""
+    """Return "rad", "m" or "" for each number of q, v or a.
+
+    The time unit is omitted.
+    """
     return tuple(
         unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
     )
@@ -276,10 +280,6 @@ def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _hints_by_length(tree: KinematicTree, symbol: str) -> dict[int, Hint]:
-    """Return hints for wrong lengths of q, v or a that users often pass.
-
-    Users often pass a vector of Pinocchio, or a vector that also contains the values of the mimic joints.
-    """
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -306,7 +306,7 @@ def _hints_by_length(tree: KinematicTree, symbol: str) -> dict[int, Hint]:
 
 
 def neutral(tree: KinematicTree) -> FloatArray:
-    """Return the zero configuration (nq,), with the identity quaternion for floating joints."""
+    """Return the zero configuration."""
     q = np.zeros(tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.kind is JointKind.FLOATING:
@@ -315,10 +315,9 @@ def neutral(tree: KinematicTree) -> FloatArray:
 
 
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
-    """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
+    """Return the named poses.
 
-    The tree's pose `ready` may contain values for some joints only. In `ready`, the value of each remaining
-    joint is 0. If the joint's range does not contain 0, the value is the middle of the range.
+    In `ready`, joints without a value are at 0, or mid-range if 0 is outside.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -336,13 +335,10 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
 def parse_locks(
     tree: KinematicTree, lock: str | Mapping[str, ArrayLike], joints: Sequence[str] | None = None
 ) -> dict[str, float]:
-    """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
+    """Return the value of each locked joint, rad or m.
 
-    Without `joints`, only the joints in `lock` are locked. If `joints` is given, the joints in `joints` stay
-    movable, and all remaining joints are locked. A locked joint without a value in `lock` is locked at 0. If
-    `joints` is given, `lock` may begin with the name of a pose. In this case, a joint without a value in
-    `lock` is locked at the pose's value. An unknown name raises UnknownNameError. Any other invalid lock, for
-    example a value outside the limits, raises InputError.
+    A locked joint without a value is at 0, or at the pose's value.
+    Only `joints` stay movable; by default, all joints not in `lock`.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
@@ -381,10 +377,9 @@ def parse_locks(
 
 
 def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
-    """Raise InputError if the value of a locked joint or of its mimic joint is outside the limits.
+    """Check the limits of locked joints.
 
-    The limits of the mimic joints can together allow at most one value of the locked joint. In this case, the
-    limits of these mimic joints are not checked.
+    Mimic joints that together allow at most one value are not checked.
     """
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
@@ -420,7 +415,7 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Normalise the quaternions of floating joints; raise InputError if a norm is not 1 within 1e-6."""
+    """Normalise the quaternions of floating joints."""
     if not tree.floating_joints:
         return q
     q = q.copy()
@@ -449,7 +444,6 @@ def parse_numbers(tree: KinematicTree, value: ConfigurationLike, symbol: str) ->
 def parse_and_normalise(
     tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
 ) -> FloatArray:
-    """Parse q, v or a; normalise the quaternions of q, and warn of degrees if `warn` is true."""
     array = parse_numbers(tree, value, symbol)
     if symbol != "q":
         return array
@@ -461,7 +455,6 @@ def parse_and_normalise(
 def parse_finite(
     tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
 ) -> FloatArray:
-    """Return the result of `parse_and_normalise`; raise NotFiniteError if a number is not finite."""
     array = parse_and_normalise(tree, value, symbol, warn=warn)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
@@ -476,10 +469,7 @@ def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint that exceeds its limits in a configuration of `q`.
-
-    The function also checks mimic joints.
-    """
+    """Return messages about values outside limits."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -507,13 +497,13 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations in the search for degrees.
+#: Maximum number of configurations in the search for degrees.
 #: All configurations of a batch have the same unit.
 _MAX_CHECKED = 16
 
 
 def degrees_messages(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint whose value seems to be in degrees; check at most 16 configurations."""
+    """Return messages about values that seem to be degrees."""
     if tree.min_implausible_angle == math.inf or not q.size:
         return []
     if q.ndim == 2:
@@ -561,10 +551,9 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """Convert Pinocchio's configuration (..., nq_pinocchio) to urdfkin's (..., nq).
+    """Convert Pinocchio's configurations to urdfkin's.
 
-    Angles of continuous and planar joints are returned in [-pi, pi]. A (cos, sin) pair whose norm is not 1,
-    or a mimic joint that does not obey its rule, raises InputError.
+    Continuous and planar joints get angles in [-pi, pi].
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -634,7 +623,7 @@ _MAX_POSITION = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Random configurations `q` (n, nq), velocities `v` and accelerations `a` (n, nv)."""
+    """Random configurations, velocities and accelerations."""
 
     q: FloatArray
     v: FloatArray
@@ -642,12 +631,7 @@ class Samples:
 
 
 def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
-    """Return random configurations (n, nq), uniform within the ranges of `coordinate_ranges`.
-
-    Continuous joints take any angle. Planar and floating joints take any orientation, and positions within
-    +-2 m. For a revolute or prismatic joint, +-10 (rad or m) replaces a missing limit, and a limit beyond
-    +-10.
-    """
+    """Draw random configurations."""
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
 
@@ -679,7 +663,7 @@ _SAMPLERS = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_float
 
 
 def special_configurations(tree: KinematicTree) -> FloatArray:
-    """Return (3, nq): the zero configuration, then all joints at the lower and at the upper limit."""
+    """Return the zero, lower-limit and upper-limit configurations."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = joint_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -689,7 +673,6 @@ def special_configurations(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link, with velocities and accelerations as in `draw_samples`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_from_quaternion(placed[:, 3:]), placed[:, :3]
@@ -700,11 +683,10 @@ def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
 
 
 def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Return `n` random samples for a validation; `with_special` adds `special_configurations`.
+    """Draw random samples for a validation.
 
-    The samples cover the whole range of each independent joint. A mimic joint may exceed its limits, because
-    the equations are also valid outside the limits. Every eighth sample has a hundred times larger velocities
-    and accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
+    A mimic joint may exceed its limits: the equations are also valid there.
+    Every eighth sample is fast: the quadratic terms of 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_special:

@@ -44,17 +44,14 @@ class Hint(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CoordinateLayout:
-    """Names and units of the numbers of q, v or a.
+    """Names and units of q, v or a.
 
     Attributes:
         symbol: "q", "v" or "a".
-        units: "rad", "m", "" or None. A number without a unit, such as a component of a quaternion, has "".
-            None means that the unit is unknown.
-        spans: For each joint with several numbers, by the joint's name: the index of the first number, and
-            the count of the numbers.
-        hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
-        hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of
-            Pinocchio's q.
+        units: "rad", "m", "" without unit, or None if unknown.
+        spans: First index and count, for joints with several numbers.
+        hints_by_name: Hints for joints without a coordinate.
+        hints_by_length: Hints for wrong lengths.
     """
 
     symbol: str
@@ -66,9 +63,7 @@ class CoordinateLayout:
     hints_by_length: Callable[[], Mapping[int, Hint]] = dict
 
     def parse(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
-        """Return the numbers (..., n) of q, v or a that a text or a mapping describes.
-
-        An unknown name raises UnknownNameError; any other invalid input raises InputError.
+        """Return the numbers that a text or mapping describes.
 
         >>> rest = {"neutral": np.zeros(2)}
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
@@ -88,10 +83,9 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Parse a text or mapping; return the given values by name, and the pose (n,) that the text names.
+        """Return the values by name, and the named pose.
 
-        For example, the text `ready, elbow=pi/2` names the pose `ready`. If the input names no pose, the
-        second result is None.
+        The pose is None if the text names no pose.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).parse_by_name("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
@@ -123,7 +117,6 @@ with 'neutral, elbow=...'
         return not is_pose and all(_split_pair(cell)[0] is None for cell in cells)
 
     def check_names(self, names: Sequence[str], where: str) -> None:
-        """Raise an error if a name is neither a coordinate nor a joint with several coordinates."""
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
                 raise self._unknown_name_error(name, where)
@@ -216,7 +209,9 @@ with 'neutral, elbow=...'
 
 
 def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return text or a mapping unchanged, a table with labels as a mapping, and None for other values.
+    """Return text or a mapping; None for other values.
+
+    A table with labels becomes a mapping.
 
     >>> [as_text_or_mapping(value, "q") for value in ([0.5, 0.1], "ready", {"elbow": 0.5})]
     [None, 'ready', {'elbow': 0.5}]
@@ -242,7 +237,10 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
 
 
 def _labels(value: object) -> list[Any]:
-    """Return the labels of a table, such as column names; an empty list if the labels are 0, 1, 2, ..."""
+    """Return the labels of a table.
+
+    The labels 0, 1, 2, ... count as no labels.
+    """
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
@@ -276,7 +274,7 @@ def join_names(names: Sequence[str]) -> str:
 
 
 def _split_cells(text: str) -> list[str]:
-    """Split a text at commas, or at blanks if the text has no commas."""
+    """Split a text at commas, or otherwise at blanks."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()
@@ -286,16 +284,12 @@ def _split_cells(text: str) -> list[str]:
 
 
 def _split_pair(cell: str) -> tuple[str | None, str]:
-    """Split a text such as "joint_1=0.5" into name and number; without `=`, the name is None."""
+    """Split "name=0.5" into name and number."""
     name, equals, number = cell.rpartition("=")
     return (name.strip(), number.strip()) if equals else (None, cell)
 
 
 def _is_pose_name(text: str) -> bool:
-    """Return whether a text can be the name of a pose.
-
-    Such a text begins with a letter, contains no `=`, and does not look like a number.
-    """
     return (
         text[:1].isalpha()
         and "=" not in text

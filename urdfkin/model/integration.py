@@ -3,8 +3,11 @@
 For a configuration q with orientations, q + v is meaningless; use `integrate` and `difference` instead of +
 and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
 `integrate` adds and `difference` subtracts. For a planar or floating joint, the joint velocity (w, s) is
-constant in the moving frame, so the joint makes a screw motion: R = R_0 exp(w), p = p_0 + R_0 V(w) s, with
-V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2.
+constant in the moving frame, so the joint makes a screw motion:
+
+    R = R_0 exp(w)
+    p = p_0 + R_0 V(w) s
+    V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ _SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the configuration (..., nq) that `q` reaches in one second at constant velocities `v`."""
+    """Return the configuration after one second at constant velocities."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, q_index, v_index in _coordinate_joints(tree):
@@ -48,10 +51,9 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
+    """Return the velocities that lead to `end` in one second.
 
-    A continuous joint can rotate to `end` in two directions. The result contains the shorter of the two
-    rotations. The same rule holds for the angle of a planar joint.
+    Continuous and planar joints rotate by the smaller angle.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -88,15 +90,14 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 
 
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
     p, orientation = _screw(joint, block)
     return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
 
 
 def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear and angular part of a planar or floating joint's coordinates or velocity.
+    """Split `block` into a linear and an angular part.
 
-    The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
+    The angular part is a quaternion for a floating joint's coordinates.
     """
     if joint.kind is JointKind.FLOATING:
         return block[..., :3], block[..., 3:]

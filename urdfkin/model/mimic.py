@@ -21,7 +21,7 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, free
 
 @dataclass(frozen=True)
 class Coupling:
-    """The linear map from a path's coordinates to the values of its joints: values = G q + g.
+    """The linear map from a path's coordinates to joint values: G q + g.
 
     >>> turn = JointKind.REVOLUTE
     >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
@@ -40,7 +40,7 @@ class Coupling:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the coordinates, which are the independent joints, in path order."""
+        """Names of the independent joints, in path order."""
         return tuple(dict.fromkeys(self._independent_joints))
 
     @cached_property
@@ -51,16 +51,13 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g (joints,) in the formula of all joint values, G q + g.
-
-        For a mimic joint, the entry of g is the offset in the mimic rule. For other joints, the entry is 0.
-        """
+        """The vector g of the joint values G q + g."""
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
-        # The mimicked joint's unit is unknown here.
+        # The unit of a mimicked joint outside the path is unknown.
         own = tuple(map(units.get, self.names))
         hints = {
             joint: Hint(
@@ -74,9 +71,9 @@ class Coupling:
         return CoordinateLayout(symbol, self.names, own, poses=lambda: neutral, hints_by_name=lambda: hints)
 
     def values(self, q: ConfigurationLike) -> FloatArray:
-        """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
+        """Return all joint values, rad or m."""
         coordinates = self.parse(q, "q")
-        # Each row of G has one nonzero number, so no product is needed.
+        # Each row of G has at most one nonzero number, so no matrix product is needed.
         return np.asarray(coordinates[..., self._independent_index] * self._multiplier + self.offset)
 
     def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:

@@ -30,9 +30,9 @@ _IDENTITY = np.eye(4)
 
 @dataclass(frozen=True, slots=True)
 class ElementaryMotion:
-    """A rotation about a coordinate axis of the current frame, or a translation along this axis.
+    """A rotation about, or translation along, a coordinate axis.
 
-    The value of `axis` is 0 for the x axis, 1 for y and 2 for z.
+    `axis` is 0 for x, 1 for y and 2 for z.
     """
 
     axis: int
@@ -41,7 +41,9 @@ class ElementaryMotion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """A product of constant poses (4, 4) and elementary motions, first to last.
+    """A product of constant poses and elementary motions.
+
+    The amounts (..., motions) are angles (rad) or distances (m).
 
     >>> arm = Path((ElementaryMotion(2, turns=True), elementary_pose(0, False, 2.0)))
     >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
@@ -53,7 +55,11 @@ class Path:
     steps: tuple[FloatArray | ElementaryMotion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses (..., steps, 4, 4) after each step; `amounts` (..., motions) are in rad or m."""
+        """Return the poses after each step.
+
+        Returns:
+            (..., steps, 4, 4) poses.
+        """
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
         for i, T in enumerate(self._after_each_step(amounts)):
@@ -61,7 +67,10 @@ class Path:
         return frames
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
-        """Yield the poses (..., 4, 4) after each step; the yielded arrays may share memory."""
+        """Yield the pose after each step.
+
+        The yielded arrays may share memory.
+        """
         # A motion by 0 changes nothing and is skipped.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
@@ -76,7 +85,7 @@ class Path:
             yield T
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the pose (..., 4, 4) at the end of the path; `amounts` (..., motions) are in rad or m."""
+        """Return the poses (..., 4, 4) at the path's end."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         for T in self._after_each_step(amounts):  # noqa: B007
@@ -84,13 +93,17 @@ class Path:
         return np.array(T)
 
     def pose_and_jacobian(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular]."""
+        """Return the pose and Jacobian at the path's end.
+
+        Returns:
+            (..., 4, 4) pose and (..., 6, motions) Jacobian, [linear; angular].
+        """
         return self.pose_and_jacobian_from_frames(self.frames(amounts))
 
     def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
-        # A motion does not move its own axis.
+        # A motion does not move its own axis, so the frame after the motion gives the axis.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))
@@ -104,10 +117,6 @@ class Path:
 
 
 def elementary_pose(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
-    """Return the poses (..., 4, 4) of elementary motions.
-
-    `amount` is the angle (rad) of a rotation about the axis, or the distance (m) of a translation along it.
-    """
     amount = np.asarray(amount, np.float64)
     T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
     return _apply_motion(T, ElementaryMotion(axis, turns), amount) if amount.any() else T

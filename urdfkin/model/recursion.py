@@ -25,10 +25,10 @@ IDENTITY: Matrix = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """The position, velocity and acceleration of a link's frame.
+    """The pose, velocity and acceleration of a link.
 
-    R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
-    axes if `Recursion.own_axes` is True, and in world axes otherwise.
+    R and p are in world axes.
+    `Recursion.own_axes` determines the axes of w, vel, alpha and acc.
     """
 
     R: Matrix = IDENTITY
@@ -41,12 +41,12 @@ class LinkState:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One Jacobian column of a joint, with the axis z and the multiplier `factor` of the mimic rule.
+    """One Jacobian column of a joint.
 
     Attributes:
-        carrier: State of the frame that the joint's axis is fixed to.
-        order: Position of the joint on the path, counted from the base.
-        v_index: Index of the joint velocity in v.
+        carrier: State of the frame to which the axis is fixed.
+        order: Position on the path, counted from the base.
+        factor: Multiplier of the mimic rule.
     """
 
     z: Vector
@@ -59,10 +59,11 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """Steps of the recursion: each step computes a link's state from the state of the previous link.
+    """The steps of the forward recursion.
 
-    Velocities and accelerations are expressed in each link's own axes if `own_axes` is True, and in world
-    axes otherwise.
+    Attributes:
+        eq: The textbook's equations.
+        own_axes: Axes of velocities and accelerations: link axes if True, else world axes.
     """
 
     eq: Any
@@ -72,13 +73,13 @@ class Recursion:
         return x if self.own_axes else self.eq.rotate(s.R, x)
 
     def translate_frame(self, s: LinkState, d: Vector) -> LinkState:
-        """Return the state of the point at the offset d from the link's origin (7.58, 7.128, 7.130)."""
+        """Move the origin by the offset d (7.58, 7.128, 7.130)."""
         eq, lever = self.eq, self.express(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def rotate_frame(self, s: LinkState, S: Matrix) -> LinkState:
-        """Return the state of a frame that is fixed to the same body, but rotated by S."""
+        """Rotate the frame by S."""
         R = self.eq.product(s.R, S)
         if not self.own_axes:
             return replace(s, R=R)
@@ -86,35 +87,32 @@ class Recursion:
         return LinkState(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def after_revolute(self, s: LinkState, axis: Vector, S: Matrix, v: Number, a: Number) -> LinkState:
-        """Return the state of the link after a revolute joint with rotation matrix S (7.129, 7.127)."""
+        """Return the state after a revolute joint (7.127, 7.129)."""
         z = self.express(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.rotate_frame(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def after_prismatic(self, s: LinkState, axis: Vector, x: Number, v: Number, a: Number) -> LinkState:
-        """Return the state of the link after a prismatic joint (7.64, 7.130, 7.128)."""
+        """Return the state after a prismatic joint (7.64, 7.128, 7.130)."""
         s = self.translate_frame(s, self.eq.times(x, axis))
         z = self.express(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def after_planar(self, s: LinkState, q: JointSlice, S: Matrix, v: JointSlice, a: JointSlice) -> LinkState:
-        """Return the state of the link after a planar joint; S is the joint's rotation matrix."""
         rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
         return self._after_free_joint(s, (q[0], q[1], 0), S, rates)
 
     def after_floating(
         self, s: LinkState, q: JointSlice, S: Matrix, v: JointSlice, a: JointSlice
     ) -> LinkState:
-        """Return the state of the link after a floating joint; S is the joint's rotation matrix."""
         rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
         return self._after_free_joint(s, (q[0], q[1], q[2]), S, rates)
 
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
-        """Return the state of the link after a planar or floating joint.
+        """Return the state after a planar or floating joint.
 
-        `rates` contains the joint's linear and angular velocity, then its linear and angular acceleration.
-        All four vectors are expressed in the child link's axes.
+        The four vectors `rates` are in the child link's axes.
         """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
@@ -129,13 +127,13 @@ class Recursion:
     # -- quantities of a frame; columns are in the world's axes --------------------------------------
 
     def velocity(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
-        """Return the linear and the angular velocity of a frame (7.127, 7.128)."""
+        """Return the linear and angular velocity (7.127, 7.128)."""
         if not reference.at_world:
             return s.vel, s.w
         return self.eq.point_velocity(s.vel, s.w, self.eq.minus(ZERO, s.p)), s.w
 
     def acceleration(self, s: LinkState, reference: Reference) -> tuple[Vector, Vector]:
-        """Return the linear and the angular classical acceleration of a frame (7.129, 7.130)."""
+        """Return the classical acceleration (7.129, 7.130)."""
         if not reference.at_world:
             return s.acc, s.alpha
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
@@ -155,14 +153,14 @@ class Recursion:
     def jacobian(
         self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
     ) -> list[SixVector]:
-        """Return the columns of the Jacobian (7.85), one for each joint velocity."""
+        """Return the Jacobian's columns (7.85)."""
         to = ZERO if reference.at_world else s.p
         return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
 
     def jacobian_rate(
         self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
     ) -> list[SixVector]:
-        """Return the columns of the Jacobian's time derivative (7.126)."""
+        """Return the columns' time derivatives (7.126)."""
         to, to_rate = (ZERO, ZERO) if reference.at_world else (s.p, s.vel)
         rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
         return self._add_mimic_columns(s, reference, nv, rates)
@@ -183,7 +181,7 @@ class Recursion:
     def _add_mimic_columns(
         self, s: LinkState, reference: Reference, nv: int, columns: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[SixVector]:
-        """Add the column of each mimic joint to the mimicked joint's column."""
+        """Add mimic joints' columns to the mimicked joints' columns."""
         out: list[SixVector] = [(0,) * 6] * nv
         for column, linear, angular in columns:
             six = self.in_reference(s, reference, linear, angular)
@@ -195,11 +193,9 @@ class Recursion:
     def hessian(
         self, s: LinkState, columns: Sequence[Column], reference: Reference
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
-        """Yield the derivative of each Jacobian column with respect to each joint coordinate.
+        """Yield the derivatives of the columns.
 
-        Each tuple is (i, j, factor, derivative). The column has the index i in v, and the coordinate has the
-        index j. The derivative must be multiplied by `factor`, the product of the two joints' mimic
-        multipliers.
+        The tuples are (i, j, factor, x). For each i and j, the sum of factor * x is d(column i)/dq_j.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
@@ -209,10 +205,10 @@ class Recursion:
                 yield of.v_index, by.v_index, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of the Jacobian column `six` with respect to a joint coordinate.
+        """Return the derivative of the column `six`.
 
-        `by` is the Jacobian column of the joint that has this coordinate. `before` is True if `by` belongs to
-        the same joint as `six`, or to an earlier joint of the path.
+        `by` is the column of the joint that moves.
+        `before` is False if this joint follows the joint of `six`.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -14,8 +14,8 @@ class Reference(IntEnum):
     The compiled kernels use the members' numbers.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
-    * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
-    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes. The textbook uses this frame (7.85).
+    * `WORLD`: the body point that is now at the world's origin, in the world's axes.
+    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes, as in the textbook (7.85).
 
     Every `reference` argument accepts a member or its name, in upper or lower case:
 
@@ -39,9 +39,10 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member with the given name, in upper or lower case; return a given member unchanged.
+        """Return the reference frame with the given name.
 
-        An unknown name raises UnknownNameError.
+        The name may be in upper or lower case. A member is returned unchanged. An unknown name raises
+        UnknownNameError.
 
         >>> Reference.of("local").name
         'LOCAL'

@@ -38,7 +38,7 @@ def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
 
 
 class JointTable(dict[str, Joint], Displayable):
-    """The joints of a robot by name: a dict that `print` and notebooks show as a table."""
+    """A robot's joints by name, displayed as a table."""
 
     def __init__(self, tree: KinematicTree) -> None:
         super().__init__((joint.name, joint) for joint in tree.joints)
@@ -59,10 +59,7 @@ class JointTable(dict[str, Joint], Displayable):
 
 
 def tree_guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield the box-drawing characters before each link name, for example `├ `.
-
-    A link without siblings is indented as far as its parent link.
-    """
+    """Yield box-drawing characters before link names."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1
@@ -96,7 +93,7 @@ def _index_text(letter: str, at: int, count: int) -> str:
 
 
 def format_axis(axis: Sequence[float]) -> str:
-    """Return a joint's axis as text: `z`, `-x`, or three numbers if the axis is not along a frame axis.
+    """Return a joint's axis as text.
 
     >>> format_axis((0.0, -1.0, 0.0)), format_axis((0.0, 0.6, 0.8))
     ('-y', '0 0.6 0.8')
@@ -108,7 +105,7 @@ def format_axis(axis: Sequence[float]) -> str:
 
 
 def format_mimic_rule(mimicked_joint: str, factor: float, offset: float) -> str:
-    """Return the mimic rule of a joint as text.
+    """Return a mimic rule as text.
 
     >>> format_mimic_rule("thumb", 2.0, -0.1), format_mimic_rule("thumb", 1.0, 0.0)
     ('2 * thumb -0.1', 'thumb')

@@ -27,10 +27,10 @@ FloatArray = inputs.FloatArray
 
 
 class FrameName(str):
-    """The name of a frame with a prefix, `link:NAME` or `joint:NAME`.
+    """A frame's name with a prefix.
 
-    `LinkFrame("link:NAME")` always selects the link NAME, and `JointFrame("joint:NAME")` the joint NAME. A
-    plain string "link:NAME" can also be the full name of a link or joint.
+    `LinkFrame` always selects a link, and `JointFrame` a joint. A plain string "link:NAME" can also be the
+    full name of a link or joint.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
@@ -54,14 +54,14 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
-    """The name of a joint's frame, which is the frame of the joint's child link."""
+    """The name of a joint's frame, which is the child link's frame."""
 
     __slots__ = ()
     prefix = "joint:"
 
 
 def freeze(array: ArrayLike) -> FloatArray:
-    """Return a read-only, C-contiguous float64 copy of `array`; raise InputError for non-numeric data."""
+    """Return a read-only, C-contiguous float64 copy."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
     copy = np.array(array if numeric else inputs.as_floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
@@ -69,7 +69,7 @@ def freeze(array: ArrayLike) -> FloatArray:
 
 
 class JointKind(Enum):
-    """The joint types of the URDF specification; each value is the word used in the file."""
+    """The joint types of a URDF."""
 
     nq: int
     nv: int
@@ -96,7 +96,12 @@ class JointKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Limits of a joint: `lower`, `upper` in rad or m, `velocity` in rad/s or m/s, `effort` in N m or N."""
+    """The limits of a joint, in rad or m.
+
+    Attributes:
+        velocity: Largest speed, rad/s or m/s.
+        effort: Largest effort, N m or N.
+    """
 
     lower: float
     upper: float
@@ -104,7 +109,7 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle; some wrists turn 400 degrees.
+#: Largest plausible joint angle, rad; some wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A joint value is far outside a limit if the excess is above
 #: `_FAR_DISTANCE` (rad or m)
@@ -114,7 +119,7 @@ _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
 def far_limits(lower: float, upper: float) -> tuple[float, float]:
-    """Return the two values beyond which a joint value is far outside its limits.
+    """Widen the limits by a large margin.
 
     >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
@@ -129,9 +134,9 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint: multiplier * (value of the mimicked joint) + offset.
+    """The rule of a mimic joint.
 
-    The mimicked joint is not a mimic joint.
+    The joint has the value multiplier * q_mimicked + offset. The mimicked joint is not a mimic joint.
     """
 
     mimicked_joint: str
@@ -145,17 +150,14 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """One joint and its pose in the parent link.
+    """One joint of a robot.
 
     Attributes:
-        parent: Index of the parent link in `KinematicTree.links`.
-        T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
-            child link's frame is the joint frame after the motion.
-        axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        tilt: Angle (rad) between `axis` and the coordinate axis that Pinocchio uses for the joint; usually 0.
-            If the angle is not 0, urdfkin reports the finding URDF514. urdfkin's kinematics do not depend on
-            the angle. The angle can increase the differences between the results of urdfkin and Pinocchio.
-        lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
+        parent: Index of the parent link.
+        T_parent_joint: Pose at q = 0, m.
+        axis: (3,) unit axis in the joint frame; (1, 0, 0) without axis.
+        tilt: Angle between `axis` and Pinocchio's axis, rad. urdfkin's kinematics do not use this angle.
+        lock: None unless the user fixed the joint.
     """
 
     name: str
@@ -196,7 +198,10 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
+        """Length of the offset from the parent link, m.
+
+        The displacement of a locked prismatic joint is added.
+        """
         # hypot avoids squares, which overflow for 1e200 and underflow for 1e-200.
         length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
@@ -206,9 +211,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lock:
-    """A joint of the URDF that the user fixed at a value.
+    """A joint that the user fixed.
 
-    `q` (rad or m) is the joint's coordinate; for a mimic joint, the coordinate of the mimicked joint.
+    Attributes:
+        q: Coordinate of the independent joint, rad or m.
     """
 
     joint: Joint
@@ -221,7 +227,7 @@ class Lock:
 
     @property
     def motion(self) -> FloatArray:
-        """Pose (4, 4) of the child link's frame in the joint frame."""
+        """Pose of the child link in the joint frame."""
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
@@ -240,16 +246,12 @@ class Lock:
 
 @dataclass(frozen=True)
 class KinematicTree:
-    """Links and joints of one robot, in Pinocchio's order.
+    """A robot's links and joints.
 
     Attributes:
-        name: The robot's name.
-        links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
-        joints: All joints, including fixed joints; a joint's parent link always precedes its child link.
-        poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
-
-    A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError. An unknown
-    mimicked joint raises UnknownNameError.
+        links: The link `links[i + 1]` is the child of `joints[i]`.
+        joints: All joints in Pinocchio's order; a parent link precedes its child link.
+        poses: Named poses, each for some joints.
     """
 
     name: str
@@ -290,7 +292,6 @@ class KinematicTree:
 
     @cached_property
     def floating_joints(self) -> tuple[int, ...]:
-        """Indices of the joints that have a quaternion in `q`."""
         return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
 
     @cached_property
@@ -303,12 +304,14 @@ class KinematicTree:
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Index of each joint's first coordinate in `q`; a mimic joint has the mimicked joint's index."""
+        """First index of each joint in `q`.
+
+        A mimic joint has the mimicked joint's index.
+        """
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Index of each joint's first velocity in `v`; a mimic joint has the mimicked joint's index."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
@@ -321,9 +324,9 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Smallest and largest plausible angles (2, nq) of revolute joints with limits, rad.
+        """Smallest and largest plausible angles (2, nq), rad.
 
-        The entries of all other coordinates are infinite.
+        Only rotating joints with limits have finite entries.
         """
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
@@ -334,7 +337,7 @@ class KinematicTree:
 
     @cached_property
     def min_implausible_angle(self) -> float:
-        """Smallest absolute value in `plausible_angles`; infinite if no revolute joint has limits."""
+        """Smallest absolute value in `plausible_angles`."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
@@ -359,7 +362,7 @@ class KinematicTree:
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames."""
+        """Unique frame names, root first."""
         names = [self.links[0]]
         for joint, child in zip(self.joints, self.links[1:], strict=True):
             names += [joint.name, child]
@@ -374,12 +377,9 @@ class KinematicTree:
         return tuple(JointFrame.of(joint.name) for joint in self.joints)
 
     def frame_link(self, name: str) -> int:
-        """Return the index of the link that carries the frame `name`.
+        """Return the index of the frame's link.
 
-        A link or joint with exactly this name has priority. If no link or joint has this name, `link:NAME`
-        selects the link NAME, and `joint:NAME` selects the joint NAME. An unknown name raises
-        UnknownNameError. If a link and a joint have this name, the link must be the joint's child link;
-        otherwise, InputError is raised.
+        In a plain string, a full name has priority over a prefix.
         """
         if not isinstance(name, str):
             raise InputError(
@@ -429,7 +429,6 @@ class KinematicTree:
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """Return the link's own name, or a `LinkFrame` if the joint of another link has the same name."""
         name = self.links[link]
         joint = self._joint_index.get(name)
         return name if joint is None or joint + 1 == link else self.link_frames[link]
@@ -437,7 +436,7 @@ class KinematicTree:
     # -- paths ---------------------------------------------------------------------------------------
 
     def path(self, link: int) -> tuple[int, ...]:
-        """Return the indices of the joints between the root and a link, root first."""
+        """Return the joint indices, root first."""
         joints = []
         while link > 0:
             joints.append(link - 1)
@@ -450,7 +449,6 @@ class KinematicTree:
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Add a root link `universe` and a joint `root_joint`; Pinocchio uses the same names."""
     for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
         if name in known:
             raise InputError(
@@ -469,7 +467,10 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Add named poses; store only the values of joints with exactly one coordinate."""
+    """Add named poses.
+
+    Only joints with one coordinate keep their values.
+    """
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
@@ -478,7 +479,10 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
+    """Fix joints at values, rad or m.
+
+    Joints that mimic a fixed joint are fixed too.
+    """
     independent_joints = [joint.mimic.mimicked_joint if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint
@@ -492,7 +496,7 @@ def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Sort the triples (joint, parent link, child link) into a tree in Pinocchio's order."""
+    """Sort triples (joint, parent link, child link) into Pinocchio's order."""
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
@@ -517,7 +521,6 @@ def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """Return the pose (4, 4) with a rotation and an origin (m)."""
     T = np.eye(4)
     if R is not None:
         T[:3, :3] = R
@@ -527,7 +530,6 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
-    """Return whether a matrix (4, 4) is a rigid transform, with a rotation matrix within `tolerance`."""
     return bool(inputs.rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

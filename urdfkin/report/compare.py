@@ -181,13 +181,13 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else format_units(value)
 
 
-#: Growth of the largest disagreement that is a regression.
+#: Growth of a robot's largest disagreement beyond this factor is a regression.
 #: Random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: A regression needs a disagreement above this number, in eps * scale.
+#: A larger disagreement is a regression only above this number, in eps * scale.
 #: A single rounding error can be this large.
 GROWTH_FLOOR = 2.0
-#: A regression of the bound ratio needs a ratio above this number.
+#: A larger ratio of disagreement to bound is a regression only above this number.
 _BOUND_RATIO_FLOOR = 0.1
 
 

@@ -41,10 +41,10 @@ GUESSED = (
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances up to FACTOR rounding bounds are not printed.
+#: Distances and angles up to FACTOR times the rounding bound are not printed.
 #: The factor covers sums of several terms.
 FACTOR = 1.001
-#: Heading for mimicked joints with a too large range.
+#: Heading for mimicked joints whose range is too large for a mimic joint.
 #: Such a joint moves a mimic joint beyond its limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
@@ -344,7 +344,7 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 #: `HALF`: half the side length of a picture, SVG units.
-#: `FILLED`: part of the picture that the robots fill.
+#: `FILLED`: width or height of the drawn robots, relative to the picture.
 HALF, FILLED = 150.0, 0.9
 #: Maximum length of the scale bar, in side lengths.
 MAX_SCALE_BAR = 0.3

@@ -160,9 +160,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Pose errors of a USD stage in single precision; None without a stage.
+        #: Bounds of pose errors from a USD stage's single precision; None without a stage.
         self.single: SinglePrecisionErrors | None = None
-        #: USD path of each link's prim (scene object).
+        #: USD path of each link's prim (scene object); empty without a stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame

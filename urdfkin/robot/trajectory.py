@@ -117,7 +117,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _MIN_SAMPLES = 3
 #: .npz arrays for the pose, velocity and acceleration of the root.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Fraction of the time step; larger rounding of times causes a note.
+#: Fraction of the smallest time step; larger rounding of times causes a note.
 _TIME_ROUNDING = 1e-6
 
 

@@ -44,9 +44,9 @@ def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Maximum time to wait for a named pipe, s.
+#: Maximum time to wait for the process at the other end of a named pipe, s.
 PIPE_TIMEOUT = 10.0
-#: Maximum size of an input file, bytes.
+#: Maximum size of a robot, table, settings or cached file, bytes.
 MAX_BYTES = 100_000_000
 #: Maximum size of data (trajectories, samples, reports), bytes.
 MAX_DATA_BYTES = 2_000_000_000

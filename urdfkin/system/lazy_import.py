@@ -48,7 +48,7 @@ def installed_version(package: str) -> str | None:
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
     # `metadata` imports many modules.
-    # Files in the current folder could replace these modules.
+    # At the start of urdfkin, files in the current folder could replace these modules.
     from importlib import metadata
 
     try:

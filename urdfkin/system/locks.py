@@ -60,7 +60,7 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        # Another thread may import the module at the same time.
+        # A module may call `register` while another thread imports that module.
         if self._registered:
             return
         with self._lock:

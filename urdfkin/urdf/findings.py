@@ -93,7 +93,7 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Maximum rounding error of an angle up to one revolution, rad.
+#: Bound of the rounding error of an angle up to one revolution, rad.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -415,12 +415,12 @@ class CommentIndex:
         return None
 
 
-#: Maximum number of misspelt names with a suggestion.
+#: Maximum number of searches for similar names in a file.
 MAX_SEARCHES = 20
 #: Limits of one search: names, and compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: Number of warnings or notes that become one finding.
+#: Minimum number of warnings or notes with one code that become one finding.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
 #: URDF7xx: inertials, shapes, meshes and materials, without effect on kinematics.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2

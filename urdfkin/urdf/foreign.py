@@ -134,7 +134,7 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Pinocchio's joint classes about x, y or z.
+#: Pinocchio's joint classes with the axis x, y or z.
 #: R: revolute, RUB: revolute without limits, P: prismatic.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {

@@ -295,7 +295,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, with_shapes: bool = 
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_make_alignment_remark(body.name, with_shapes=with_shapes) for body in aligned]
-    # Some hinges turn several times, so large limits are plausible.
+    # In radians, large limits are plausible, because some hinges turn several times.
     notes += _check_angle_unit(mujoco, model) if spec.compiler.degree else ()
     return Mjcf(
         tree, model, fused_model, reader.frames, reader.qpos_index, reader.mimic_equalities,
@@ -350,7 +350,7 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Lists that kinematics does not use, with a name for elements.
+#: Lists of MuJoCo's model that kinematics does not use, with the singular of each name.
 _SINGULAR = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",

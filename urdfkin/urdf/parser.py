@@ -173,7 +173,7 @@ COMMON_DEPTH = 256
 #: Number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
-#: Maximum number of stored characters of an element's text.
+#: Once this many characters of an element's text are stored, further text is ignored.
 _MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes that name a link or joint.
@@ -541,7 +541,7 @@ class NumberReader:
         )
 
 
-#: Messages name only the attribute of these elements.
+#: Messages about invalid numbers name only the attribute of these elements.
 #: For other elements, the message also names the element.
 _ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
@@ -785,7 +785,7 @@ class JointReader:
             return  # Rule URDF212 reports text between tags.
         message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
-        # A planar joint moves in the frame's XY plane.
+        # A planar joint moves in its frame's XY plane, whatever the axis is.
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 

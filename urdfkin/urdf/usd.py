@@ -253,7 +253,7 @@ def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # Without this file, OpenUSD searches in the current folder.
+        # Without a file beside the layer, OpenUSD searches in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
@@ -622,7 +622,7 @@ class _StageReader:
         kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
         # A and B: poses relative to a body, or to a world with z up.
-        # `UsdJoint` has poses in the stage's world, in which y may be up.
+        # `UsdJoint`: poses relative to a body, or to the stage's world, in which y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -979,7 +979,7 @@ class _StageReader:
             return
         # In a URDF, joint and child link have the same frame.
         # For another child frame, the joint moves an additional link.
-        # A fixed joint connects it with the child link.
+        # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield make_fixed_joint(make_unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there

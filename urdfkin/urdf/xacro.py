@@ -28,7 +28,7 @@ from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.expressions import RefusedError
 
-#: Limits of the search for arguments: bytes per file, and files.
+#: Limits of the search for declared arguments: bytes per file, and number of files.
 MAX_SEARCHED_BYTES, MAX_SEARCHED_FILES = 10_000_000, 200
 
 #: Function that returns a package's folder, or raises LookupError.
@@ -77,7 +77,7 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
     return folder / name
 
 
-#: Maximum time of an expansion, s; macros may call themselves.
+#: Maximum time of an expansion, s; macros may call themselves without end.
 PATIENCE = 60.0
 
 #: Maximum size of the expanded URDF in bytes.

@@ -33,7 +33,7 @@ class Failure:
 
     Attributes:
         is_transient: Whether the robot is not the cause, for example if an answer was lost. A resumed run
-            computes the chunk again.
+            then computes the chunk again.
         error: Traceback of an unexpected error.
     """
 

@@ -136,7 +136,7 @@ def validate(
     collector = ResultCollector(
         robot_inputs, chunking, chunks_of_shard(len(robot_inputs), chunking, shard), progress
     )
-    # Each machine computes its own memory limit.
+    # An executor's machines compute their own memory limits.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(robot_inputs, chunking, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
@@ -150,7 +150,7 @@ def validate(
             if saved is not None:
                 campaign.load_answers(saved)
             for i, error in unread.items():
-                # Each unreadable robot gets only one failure.
+                # A failure ends this loop, so each unreadable robot gets only one.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
             missing = [

@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
-#: Maximum number of random configurations in one draw.
+#: Maximum number of random configurations in one draw; each draw has its own seed.
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
@@ -250,7 +250,7 @@ class _Block(_ComparisonBatch):
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = compute_magnitudes(self.plan, x.q, x.v, x.a, FIXED_BASE_STATE)
         # A joint and its child link have the same Jacobian.
-        # The links come first, beginning with the root.
+        # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -260,7 +260,7 @@ class _Block(_ComparisonBatch):
         """Yield error statistics for the frames and joints.
 
         A joint and its child link have the same frame. Pinocchio has different functions for joints and
-        links, so both results are compared.
+        links, so urdfkin's result is compared with both.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated_quantities():

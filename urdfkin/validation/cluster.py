@@ -49,7 +49,7 @@ _TRIES = 20
 #: Interval for counting the workers, s.
 _INTERVAL = 1.0
 #: The scheduler does not need these packages.
-#: Packages of the scheduler that need the same version as here.
+#: If the scheduler has one, its version must equal this process's version.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -134,7 +134,7 @@ class _ClusterWorker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """Yield a scheduler and workers without an open port.
+    """Yield a scheduler and workers in this process, without an open port.
 
     Dask adds its scratch folders to `sys.path`, so another user could place modules there. Therefore, only
     the current user can access these folders, and this function removes them from `sys.path`.

@@ -48,7 +48,7 @@ Progress = Callable[[CampaignProgress], None]
 class ResultCollector:
     """Collect the answers of a run for each robot.
 
-    Attributes:
+    Args:
         parts: Range of chunks to run, for each robot.
     """
 
@@ -156,7 +156,7 @@ class _RobotAnswers:
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
         # The report contains the results before the first failed chunk.
-        # The finished later chunks depend on the speed of the workers.
+        # The workers' speed determines which later chunks are finished.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
 #: Number of configurations in a fast first test for exchanged joints.
-#: A second test then uses all configurations.
+#: If an exchange explains them, a second test uses all configurations.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9

@@ -61,7 +61,7 @@ class ExecutorEngine:
         self._executor = executor
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
-        """Run the tasks; an error in the executor becomes a robot's result."""
+        """Run the tasks; an error of the executor is reported as a failure."""
         waiting, failed = chain.from_iterable(work), set[int]()
         submitted = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)

@@ -205,7 +205,7 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile; the error is at most one bin."""
+    """Return a percentile; the error is at most the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0

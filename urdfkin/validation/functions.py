@@ -427,7 +427,7 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Return urdfkin's results in the function's convention."""
+        """Return urdfkin's unchecked results; inputs and results are in the function's convention."""
         native_inputs = self._native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.

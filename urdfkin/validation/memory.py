@@ -101,7 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
-            # The kernel frees inactive cached files on demand.
+            # Inactive cached files count as used, but the kernel frees them on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

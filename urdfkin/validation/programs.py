@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _MAX_ANSWER_BYTES = 64 * 2**20
 #: Maximum number of quoted bytes of standard error.
 _MAX_ERROR_BYTES = 300
-#: Maximum number of consecutive failures.
+#: Number of consecutive failures after which the program is not called again.
 _MAX_FAILURES = 3
 _DAY = 86400.0
 
@@ -149,7 +149,7 @@ class Program:
             answer = self._parse_answer(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
-            self._stop()  # A delayed answer would belong to the wrong request.
+            self._stop()  # A delayed answer would be read as the next request's answer.
             raise
         self._failures = 0
         if isinstance(message := answer.get("error"), str):

@@ -62,9 +62,9 @@ from urdfkin.verify.quantities import (
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
-#: If the limits exclude zero, the joint is at the nearest limit.
+#: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
-#: Range of random velocities and accelerations.
+#: Random velocities and accelerations are from -_RANGE to _RANGE.
 #: Planar and floating joints have positions in the same range.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID.
@@ -81,7 +81,7 @@ SPATIAL_ACCELERATION = replace(
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: Spatial accelerations have the bound of classical accelerations.
-#: They differ by the cross product of angular and linear velocity.
+#: The accelerations differ by the cross product of angular and linear velocity.
 #: The bound includes the error of this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,

@@ -38,7 +38,7 @@ from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, W
 
 #: Module with the function `serve`, which each worker process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time for the end of a worker, s.
+#: Maximum time from the end of a worker's pipe to the end of its process, s.
 _GRACE = 5.0
 
 
@@ -136,7 +136,7 @@ def _end_with(parent: int) -> None:
 class ProcessEngine:
     """Engine with local worker processes.
 
-    Attributes:
+    Args:
         jobs: Maximum number of processes at a time.
         isolate: Whether each robot has its own process.
     """
@@ -161,7 +161,7 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    Attributes:
+    Args:
         alone: Text in the report if a process with only one robot crashes; None: processes validate several
             robots.
     """

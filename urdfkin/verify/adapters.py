@@ -46,11 +46,11 @@ _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 
 @dataclass(frozen=True)
 class LibraryModel:
-    """A robot that a library has read from a file.
+    """A robot that a library has read.
 
-    `joints` lists the joints with a coordinate, in the library's order. `poses` is a function that returns
-    the pose (4, 4) of each link relative to the root link. If the library has merged a link into another
-    link, the result does not contain the merged link.
+    Attributes:
+        joints: Joints in the library's order.
+        poses: Returns poses relative to the root.
     """
 
     joints: list[str]
@@ -61,7 +61,6 @@ class LibraryModel:
 
 
 def _is_path(source: str) -> bool:
-    """Return whether a source is the path of an MJCF or USD file, not a URDF text."""
     return not source.lstrip().startswith("<")
 
 
@@ -100,7 +99,6 @@ def _make_pose(R: Any, p: Any) -> Any:
 
 
 def _make_relative(poses: Poses, root: str) -> Poses:
-    """Convert link poses from the world to the root; a missing root pose is the identity."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
@@ -179,7 +177,7 @@ def read_mujoco(text: str) -> LibraryModel:
 
 
 def _mujoco_values(name: str, value: JointValue, names: list[str]) -> Iterator[tuple[str, JointValue]]:
-    """Yield the name and value of each MuJoCo joint that replaces a URDF joint."""
+    """Split a joint value among MuJoCo's joints."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:
@@ -187,7 +185,10 @@ def _mujoco_values(name: str, value: JointValue, names: list[str]) -> Iterator[t
 
 
 def read_drake(text: str) -> LibraryModel:
-    """Read a URDF with Drake; mimic joints require a discrete plant with the contact solver SAP."""
+    """Read a URDF with Drake.
+
+    Mimic joints require a discrete plant with the solver SAP.
+    """
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
@@ -279,14 +280,12 @@ def read_urchin(text: str) -> LibraryModel:
 
 
 def _urchin_value(joint: Any, value: JointValue) -> JointValue:
-    """Convert a joint value to urchin's form: a 4 by 4 matrix for a floating joint."""
     if joint.joint_type != "floating":
         return value
     return _make_pose(_rotation_from_quaternion(value[3:]), value[:3])
 
 
 def _rotation_from_quaternion(quaternion: JointValue) -> JointValue:
-    """Return the rotation matrix of a unit quaternion x, y, z, w."""
     x, y, z, w = quaternion
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -309,7 +308,10 @@ def read_kinpy(text: str) -> LibraryModel:
 
 
 def read_ikpy(text: str) -> LibraryModel:
-    """Read one path of a URDF from the root to a tip, because ikpy does not support branches."""
+    """Read one path from the root to a tip.
+
+    ikpy does not support branches.
+    """
     from ikpy.chain import Chain
 
     root, children = _find_root(text), _find_child_links(text)
@@ -398,11 +400,7 @@ def read_newton(path: str) -> LibraryModel:
 
 @dataclass(frozen=True)
 class Library:
-    """A library that reads robot files.
-
-    `package` is the name of the package that pip installs. `formats` lists the file formats that `read`
-    accepts. `is_single_precision` is True if the library computes in single precision.
-    """
+    """A library that reads robot files."""
 
     title: str
     package: str
@@ -436,7 +434,7 @@ def version(name: str) -> str | None:
 
 
 def evaluate_case(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the joints and link poses that a library computes, or the library's error message."""
+    """An exception of the library becomes the entry `error`."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]
@@ -457,7 +455,6 @@ def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[s
 
 
 def main() -> None:
-    """Read cases from standard input; print the results of the library named by the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
     # Texts of libraries go to standard error, results to standard output.

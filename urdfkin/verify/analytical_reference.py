@@ -16,22 +16,25 @@ Numbers = NDArray[Any]
 
 
 def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
-    """Return the Jacobian (..., 6, n) of the position and three Euler angles, and |sin b| or |cos b| (...).
+    """Return the Jacobian of position and Euler angles.
 
-    An Euler sequence rotates about the coordinate axes i, j and k, in this order: R = R_i R_j R_k. The first
-    rotation axis is e_i, and the third is R e_k. The middle axis is perpendicular to the first and the third
-    axis. With n = e_i x R e_k, the middle axis is n / |n| or -n / |n|. The range of the middle angle b
-    determines the sign:
+    The rotation R = R_i R_j R_k has these rotation axes:
 
-    - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
-    - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
+        first axis = e_i
+        third axis = R e_k
+        n = e_i x R e_k
+        middle axis = n / |n| or -n / |n|, perpendicular to both
+        k = i:  middle angle b in [0, pi],  sign +1,  |n| = |sin b|
+        k != i:  middle angle b in [-pi/2, pi/2],  sign (e_j x e_i) . e_k,  |n| = |cos b|
+        derivative of an angle = (reciprocal basis vector of its axis) . (angular velocity)
 
-    The reciprocal basis of the three rotation axes has one vector for each angle. The derivative of an angle
-    is the dot product of this vector and the angular velocity.
+    Args:
+        name: SciPy's name; capitals for body axes, small letters for fixed axes.
+        R: (..., 3, 3) rotation from body axes to world axes.
+        J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
 
-    `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. `R`
-    (..., 3, 3) is the rotation from body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian
-    [linear; angular] in world axes.
+    Returns:
+        The Jacobian (..., 6, n), and |sin b| or |cos b| (...).
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
@@ -48,10 +51,18 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
-    """Return the Jacobian (..., 7, n) of the position and a unit quaternion (..., 4), scalar last.
+    """Return the Jacobian of position and quaternion.
 
-    The derivative of the quaternion is half the product of the quaternions (w, 0) and `quat`, where w is the
-    angular velocity. `J_v` is the velocity Jacobian (..., 6, n), [linear; angular], in world axes.
+    The derivative of `quat` is half a quaternion product:
+
+        quat' = (w, 0) quat / 2,  w: angular velocity
+
+    Args:
+        quat: (..., 4) unit quaternions, scalar last.
+        J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
+
+    Returns:
+        The Jacobian (..., 7, n).
     """
     w = J_v[..., 3:, :].swapaxes(-1, -2)
     q, q0 = quat[..., np.newaxis, :3], quat[..., np.newaxis, 3:]

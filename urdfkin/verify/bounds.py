@@ -1,19 +1,19 @@
 """Bounds on the difference between two correct computations of a quantity.
 
-Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
-this bound:
+A result is accepted if no number differs from the oracle's number by more than this bound:
 
-    k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
+    k * eps * scale
+    eps = 2^-52
+    k = factors * PINOCCHIO_ROUNDINGS * joints
+    joints = number of URDF joints on the path + 1, or + 2 for a rotated base
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`compute_magnitudes`), in the unit of the number. Two computations may add the terms in different
-orders. Large terms may cancel, so that both sums are small. The bound on the rounding errors of these sums is
-still proportional to the scale.
+terms, in the unit of the number. Rounding errors are proportional to the scale, even if large terms cancel.
+The scale can be broadcast to the shape of the results.
 
 *Number k.* The number k is the allowed number of rounding errors, to first order in eps
-(`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
-rotates the vectors of the joints after it, but a rotation does not amplify errors. The error therefore grows
-linearly with the number of joints.
+(`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. Rotations do
+not amplify errors. The error therefore grows linearly with the number of joints.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -27,19 +27,24 @@ rounding error:
 | J-dot, linear rows | 3 | w, z, d |
 | Hessian, linear rows | 3 | z, z, d |
 
-The reference frames LOCAL and WORLD need one more factor. For LOCAL, this factor is a rotation into the
-frame's axes. For WORLD, this factor is a cross product with the frame's position p.
+| Reference frame | Additional factor |
+|---|---|
+| LOCAL | rotation into the frame's axes |
+| WORLD | cross product with the frame's position p |
 
-In measurements, each joint adds less than eps * scale to a difference, because rounding errors rarely all
-have the same sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared
-between small and large robots.
+In measurements, each joint adds less than eps * scale to a difference. Rounding errors rarely all have the
+same sign. Reports give each difference as a multiple of eps * scale.
 
-*Magnitudes.* `compute_magnitudes` replaces each vector by its length and evaluates the equations 7.58 and
-7.127 to 7.130 (`urdfkin.kinematics.number_kinds`). After this replacement, no term is negative, so no
-intermediate value exceeds the result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i
-w_i x z. The two terms differ by the cross product v_i^2 z x z, which is 0 except for rounding errors. The
-rounding errors of this cross product are large for fast joints with an oblique axis. The bound on the angular
-acceleration alpha therefore uses w_i instead of w_{i-1}.
+*Magnitudes.* `compute_magnitudes` replaces each vector by its length in the equations 7.58 and 7.127 to 7.130
+(`urdfkin.kinematics.number_kinds`). Then no term is negative, so no intermediate value exceeds the result.
+
+*Angular acceleration.* The bound on alpha contains w_i instead of w_{i-1}:
+
+    eq. 7.129:   v_i w_{i-1} x z
+    Pinocchio:   v_i w_i x z
+    difference:  v_i^2 z x z = 0, except for rounding errors
+
+The rounding errors of z x z are large for fast joints with an oblique axis.
 """
 
 from __future__ import annotations
@@ -74,17 +79,15 @@ _BLOCK_LENGTH = 64
 
 @dataclass(frozen=True, slots=True)
 class Magnitudes:
-    """Upper bounds on the terms of a frame's position, velocity and acceleration.
+    """Upper bounds on a frame's position, velocity and acceleration.
 
     Attributes:
-        p: (n, frames) length of the path from the world origin, with prismatic displacements, m.
+        p: (n, frames) path length from the world origin, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the rounding error of a rotated vector, divided by eps times the
-            vector's length. Each factor of a term is a rotated vector. The bound counts all URDF joints on
-            the path, and one additional joint as a margin. A rotated base counts as one more joint.
+        roundings: (n, frames) allowed relative error of a factor, eps.
     """
 
     p: FloatArray
@@ -99,10 +102,9 @@ class Magnitudes:
 def compute_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
-    """Return upper bounds on the terms of each frame's position, velocity and acceleration.
+    """Return upper bounds for all frames.
 
-    `q` has the shape (n, nq); `v` and `a` have the shape (n, nv) or are None. `base` (1 or n, 24) is the
-    state of the moving base. Without v, only `p` and `roundings` are valid.
+    `base` (1 or n, 24) is the state of the base. Without v, only `p` and `roundings` are valid.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -136,7 +138,10 @@ def _fill_without_kernel(lengths: _Lengths, inputs: Sequence[FloatArray], out: F
 
 
 def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Fill `out` with the compiled kernel; the results equal those of `_fill_without_kernel` bit for bit."""
+    """Fill `out` with the compiled kernel.
+
+    The bits equal those of `_fill_without_kernel`.
+    """
     links = lengths.links
     # The stride is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -157,7 +162,7 @@ def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArra
 
 
 def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
-    """Return an array with the given columns; a column of length 1 fills all rows."""
+    """Stack columns of length 1 or n."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -167,7 +172,10 @@ def _stack_columns(columns: Sequence[FloatArray]) -> FloatArray:
 class _MovingJoint(NamedTuple):
     """A moving joint.
 
-    `multiplier` and `offset` are the absolute values of the joint's mimic multiplier and mimic offset.
+    Attributes:
+        length: Path length from the previous moving joint, m.
+        multiplier: Absolute mimic multiplier.
+        offset: Absolute mimic offset.
     """
 
     kind: int
@@ -180,10 +188,11 @@ class _MovingJoint(NamedTuple):
 
 
 class _FrameEnd(NamedTuple):
-    """A frame of a compiled tree.
+    """The last part of a frame's path.
 
-    `step` is the index of the last moving joint before the frame. `length` is the length (m) of the path from
-    this joint to the frame.
+    Attributes:
+        step: Index of the last moving joint.
+        length: Length after this joint, m.
     """
 
     step: int
@@ -192,7 +201,11 @@ class _FrameEnd(NamedTuple):
 
 
 class _Lengths(NamedTuple):
-    """Moving joints and frames of a compiled tree, as Python numbers and as arrays."""
+    """Moving joints and frames of a compiled tree.
+
+    Attributes:
+        tables: The same numbers as arrays.
+    """
 
     links: list[_MovingJoint]
     ends: list[_FrameEnd]
@@ -222,9 +235,9 @@ def _get_lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array. The array has n rows, or one row for all n configurations.
+    """Return the columns of an array.
 
-    For a single configuration (n = 1), the columns are Python numbers.
+    For n = 1, the columns are Python numbers.
     """
     return x[0].tolist() if n == len(x) == 1 else x.T
 
@@ -242,7 +255,7 @@ _FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING):
 
 
 def _displacement(link: _MovingJoint, q: Any) -> Length:
-    """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
+    """Return a bound on a joint's displacement."""
     if link.kind != JointMotion.PRISMATIC:
         return _norm(q[link.q : link.q + _FREE_JOINT_SIZES[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.offset
@@ -254,7 +267,11 @@ def _propagate_position(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBo
 
 
 def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the norms of a planar or floating joint's displacement, velocities and accelerations."""
+    """Return the lengths of a free joint's vectors.
+
+    Returns:
+        Displacement, angular and linear velocity, angular and linear acceleration.
+    """
     at, (slides, turns) = link.v, _FREE_JOINT_SIZES[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
@@ -282,15 +299,13 @@ _allow_overflow = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale on the difference between two computations of a quantity.
+    """The bound k * eps * scale on a difference.
 
-    `k` and `scale` can be broadcast to the shape of the results.
+    Results must be equal where the scale is 0.
 
     Attributes:
-        scale: Each number of a result is a sum of terms. The scale is an upper bound on the sum of the terms'
-            absolute values, in the unit of the number. If the scale is 0, the results of urdfkin and of the
-            oracle must be equal.
-        k: Allowed difference in multiples of eps * scale.
+        scale: Bound on the sum of absolute terms.
+        k: Allowed difference, in eps * scale.
     """
 
     scale: FloatArray
@@ -298,10 +313,12 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the bound's `k` for each result, as an array of shape `leading`.
+    """Return the bound's `k` for each result.
 
-    If `k` is 0, negative or infinite, the function replaces `k` by NaN. If `k` is NaN, no result is within
-    the bound.
+    No result is within the bound if `k` is NaN.
+
+    Returns:
+        Array of shape `leading`, NaN unless 0 < k < inf.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -311,9 +328,9 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def make_bound(
     scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _ALIGNED
 ) -> Bound:
-    """Return the bound with k = factors * `magnitudes.roundings`.
+    """Return the bound with k = factors * roundings.
 
-    The reference frames LOCAL and WORLD need one factor more than `factors`.
+    LOCAL and WORLD add one factor.
     """
     factors += reference is not _ALIGNED
     k = factors * magnitudes.roundings
@@ -322,17 +339,18 @@ def make_bound(
 
 @_allow_overflow
 def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
-    """Return the `Magnitudes` for a comparison of urdfkin's results with MuJoCo's results.
+    """Convert magnitudes for Pinocchio to magnitudes for MuJoCo.
 
-    The argument `magnitudes` is valid for a comparison with Pinocchio.
+    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass:
 
-    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
-    `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
-    the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
-    of the path. Lever arms are therefore at most 2 p long. A conversion to or from the centre of mass adds a
-    cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
-    each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding
-    errors.
+    | Property | Value |
+    |---|---|
+    | centre of mass | the root, by `urdfkin.verify.mujoco` |
+    | distance of a joint or the frame from the centre of mass | at most p |
+    | lever arm | at most 2 p |
+    | conversion to the centre of mass, and back to the frame | a cross product with a lever arm |
+    | factors in a term, with this cross product | at most twice as many |
+    | rounding errors for each joint | `MUJOCO_ROUNDINGS` = 30, not `PINOCCHIO_ROUNDINGS` = 24 |
     """
     p = 2.0 * magnitudes.p
     shared = eq.tangential(magnitudes.w, magnitudes.vel)
@@ -347,15 +365,12 @@ def mujoco_magnitudes(magnitudes: Magnitudes) -> Magnitudes:
 
 
 class DecimalErrors(NamedTuple):
-    """Errors of the conversion of a URDF's decimals to doubles.
+    """Errors from converting a URDF's decimals to doubles.
 
     Attributes:
-        angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rule_count: Number of mimic rules of the joints on the path. If a joint mimics another mimic joint,
-            the number includes the rules of both joints.
-        lengths: (steps + 1,) additional lengths for `CompiledTree.lengths`, m. The terms of a chain of mimic
-            rules may cancel, but the rounding errors of the terms do not cancel. A prismatic mimic joint with
-            such a chain therefore has a positive additional length.
+        angles: (n,) sum of the angle errors, eps rad.
+        rule_count: Number of mimic rules on the path.
+        lengths: (steps + 1,) additional `CompiledTree.lengths`, m.
     """
 
     angles: FloatArray
@@ -366,41 +381,48 @@ class DecimalErrors(NamedTuple):
 def true_value_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
-    """Return the `Magnitudes` for a comparison of one program's results with the true values.
+    """Return the magnitudes for a comparison with true values.
 
-    The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
-    values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each
-    joint. One program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The
-    remaining 7.2 rounding errors cover the conversion of decimals to doubles. The offset, the axis and the
-    true value have an error of half an eps each. The error of the axis counts twice, because two rotations
-    use the axis. The conversion of two kinds of numbers causes larger errors:
+    True values follow from the URDF's decimals and from the doubles q, v and a. `plan` has a single frame.
 
-    - The relative error of roll, pitch and yaw is half an eps. All vectors after the joint therefore rotate
-      by at most eps (|roll| + |pitch| + |yaw|) / 2.
-    - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum cause an error of
-      at most eps (3 |m x| + |c|) / 2. The rounding of c causes an error of at most eps |c| / 2. The error
-      of x is multiplied by |m|.
+    *Each joint.*
 
-    *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
-    sum of the absolute values of all terms in the joint's value. For an independent joint, X is |q|. For a
-    joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules into one
-    rule M q + C. The number C is a sum of r terms, which requires r - 1 additions. No intermediate sum
-    exceeds X, so each addition has an error of at most eps X / 2. The bound therefore allows an additional
-    error of eps (r - 1) X / 2 for the sum C. All other rounding errors of the combined rule are the same as
-    in a program that applies the r rules one after the other.
+    | Rounding errors | eps |
+    |---|---|
+    | allowed: `PINOCCHIO_ROUNDINGS` | 24 |
+    | one program, at most (`urdfkin.kinematics.roundings`) | 16.8 |
+    | remainder, for the conversion of decimals to doubles | 7.2 |
+    | offset | 0.5 |
+    | axis, used by two rotations | 2 * 0.5 |
+    | true value, rounded to 17 digits | 0.5 |
 
-    *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
-    error of 1 eps rad changes a vector by at most eps times the length of the vector.
+    *Angles and mimic rules.* Their larger errors are added:
 
-    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement therefore has an
-    error of at most 1.5 r X eps, with separate rules and with a combined rule. If the offsets of a chain
-    cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
-    displacement. With this length, the bound allows a relative error of 1.5 eps for each rule. This bound
-    also covers the joint's velocity and acceleration. Velocity and acceleration are rounded less often than
-    the displacement.
+        relative error of roll, pitch and yaw = eps / 2
+        rotation of all vectors after the joint <= eps (|roll| + |pitch| + |yaw|) / 2
+        rule m x + c: roundings of m, of the product and of the sum <= eps (3 |m x| + |c|) / 2
+        rule m x + c: rounding of c <= eps |c| / 2
+        rule m x + c: error of x is multiplied by |m|
+        revolute mimic joint: an error of 1 eps rad changes each later vector by at most eps |vector|
 
-    `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
-    path to this frame, for q (n, nq).
+    *Chain of r mimic rules.* Some programs combine the rules into one rule M q + C:
+
+        X = sum of the absolute values of all terms in the joint's value
+        X = |q| for an independent joint
+        X = |m| X' + |c| for a rule m x + c, with X' of the mimicked joint
+        number of additions in C = r - 1
+        each intermediate sum <= X
+        additional error of C <= eps (r - 1) X / 2
+        other roundings: those of r separate rules
+
+    | Prismatic mimic joint with r rules | |
+    |---|---|
+    | roundings of each term of X | at most 3 r |
+    | error of the displacement, for separate and combined rules | at most 1.5 r X eps |
+    | abs(M q) + abs(C), if the offsets of a chain cancel | far below X |
+    | length of the displacement in the bound (`errors.lengths`) | X |
+    | allowed relative error | 1.5 eps for each rule |
+    | roundings of the joint velocity and acceleration | fewer than of the displacement |
     """
     magnitudes = compute_magnitudes(
         replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE
@@ -410,11 +432,6 @@ def true_value_magnitudes(
 
 
 def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
-    """Return the scale (n, frames, 4, 4) of the bound on placements.
-
-    The scale of a position is the length of the path. The scale of a rotation is 1, and the scale of the last
-    row is 0.
-    """
     scale = np.zeros((*magnitudes.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = magnitudes.p[..., None]
@@ -423,24 +440,30 @@ def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
 
 @_allow_overflow
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
-    """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
+    """Return the bound on placements from an MJCF file.
 
-    *Lengths.* In an MJCF file, the offset of a body is a sum of vectors. These vectors are the body's `pos`,
-    the `pos` of the joints, and a vector for the `ref` of a slide joint. urdfkin adds these vectors once,
-    when reading the file. MuJoCo adds the vectors for each configuration. A single vector can be longer than
-    the sum. The scale of positions is therefore the larger of the length of the path and `lengths`.
+    | Lengths | |
+    |---|---|
+    | offset of a body | sum of its `pos`, the `pos` of joints, and a vector for the `ref` of a slide joint |
+    | urdfkin | adds these vectors once, when reading the file |
+    | MuJoCo | adds these vectors for each configuration |
+    | a single vector | can be longer than the sum |
+    | scale of positions | max(length of the path, `lengths`) |
 
-    *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref. urdfkin rotates the hinge by ref and by q
-    separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
-    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
-    of a position changes by at most the angle error times the length of the path. To first order, the numbers
-    therefore change by at most `angles` * eps/2 * scale. The function multiplies the scale by 1 + `angles` /
-    k, so the bound increases by `angles` * eps * scale. The increase of the bound is twice the first-order
-    change of the numbers. The factor of two covers second-order terms.
+    *Angles.* urdfkin rotates a hinge by ref and by q. MuJoCo rotates the hinge by the rounded angle q - ref:
 
-    `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
-    lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
-    + |ref| (rad) over the hinges with a reference value.
+        error of the angle <= (eps/2) (|q| + |ref|) rad, for all bodies after the hinge
+        error of an entry of a rotation <= error of the angle
+        error of a coordinate <= (error of the angle) * (length of the path)
+        first-order error <= angles * eps/2 * scale
+        factor of the scale = 1 + angles / k
+        increase of the bound = angles * eps * scale
+        increase / first-order error = 2, for second-order terms
+
+    Args:
+        bound: Bound on the tree's placements.
+        lengths: (n, frames) sums of |pos| and |ref|, m.
+        angles: (n, frames) sums of |q| + |ref|, rad.
     """
     scale = bound.scale.copy()
     scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
@@ -450,7 +473,6 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
 @_allow_overflow
 def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of the bound on velocities [linear; angular], (n, frames, 6)."""
     linear = magnitudes.vel
     if reference.at_world:
         linear = eq.point_velocity(linear, magnitudes.w, magnitudes.p)
@@ -459,23 +481,23 @@ def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
 
 @_allow_overflow
 def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
+    """Return the scale of accelerations and of their breakdowns.
 
-    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel. The scale
-    therefore includes the term w x vel.
+        Pinocchio: classical acceleration = spatial acceleration + w x vel
+        scale: contains |w| |vel|
 
-    *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
-    d_k be the vector from joint k to the frame. Let w_k be the sum of the absolute values of the joint
-    velocities up to joint k.
+    *Breakdown.* The scale also bounds the sum of an `AccelerationBreakdown`:
 
-    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) together have a length of at most (w_k^2 -
-      w_{k-1}^2) |d_k|. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq.
-      7.130.
-    - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
-      sums in eq. 7.77.
-    - For n joints, the breakdown has 4 n terms. The sum of these terms has n + 3 rounding errors.
-    - For each joint, the bound allows 2 eps for the sums. The sums for d_k and the sum of the 4 n terms
-      together have smaller rounding errors.
+        d_k: vector from joint k to the frame
+        w_k: sum of |v_i| up to joint k
+        |v_k z x (v_k z x d_k)| + |2 w_{k-1} x (v_k z x d_k)| <= (w_k^2 - w_{k-1}^2) |d_k|
+        sum over all joints <= sum of w_k^2 * (length of link k), as in eq. 7.130
+
+    | Sum | Rounding errors |
+    |---|---|
+    | d_k, of the vectors between successive joint origins | as in eq. 7.77 |
+    | 4 n terms of a breakdown with n joints | n + 3 |
+    | allowed for the sums of each joint, in eps | 2, more than both sums need |
     """
     shared = eq.tangential(magnitudes.w, magnitudes.vel)
     linear = magnitudes.acc + shared
@@ -486,14 +508,13 @@ def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Re
 
 @_allow_overflow
 def imu_scale(magnitudes: Magnitudes, gravity: FloatArray) -> FloatArray:
-    """Return the scale of the bound on IMU readings, (n, frames, 6), for a gravity vector (3,)."""
     return _repeat_as_six_rows(
         magnitudes.acc + eq.tangential(magnitudes.w, magnitudes.vel) + norm(gravity), magnitudes.w
     )
 
 
 def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (n, frames, 6, ...) with three rows of `linear` and three rows of `angular`."""
+    """Repeat `linear` and `angular` in three rows each."""
     scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
     rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # `np.moveaxis` is slower.
     rows[:3], rows[3:] = linear, angular
@@ -502,12 +523,15 @@ def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 @_allow_overflow
 def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
+    """Return the scale of Jacobians.
 
-    A revolute joint's column is [z x d; z]. The scale is the length of the path in the linear rows, and 1 in
-    the angular rows. A prismatic joint's column is [z; 0]. The scale is 1 in the linear rows, and 0 in the
-    angular rows. For a joint that is not on the path, the scale is 0. The scale of a mimic joint is
-    multiplied by |multiplier|, and is added to the scale of the mimicked joint.
+    | Column | Linear rows | Angular rows |
+    |---|---|---|
+    | revolute joint: [z x d; z] | length of the path | 1 |
+    | prismatic joint: [z; 0] | 1 | 0 |
+    | joint that is not on the path | 0 | 0 |
+
+    The scale of a mimic joint is multiplied by |multiplier|, and added to the mimicked joint's scale.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, magnitudes.p[..., None])
@@ -516,11 +540,14 @@ def jacobian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
 
 @_allow_overflow
 def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of the bound on J-dot, (n, frames, 6, nv).
+    """Return the scale of Jacobian rates.
 
-    The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
-    frame. The derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot is
-    the derivative of components along the frame's axes, which rotate.
+    The path to the frame limits the lever arm d:
+
+        linear rows of a revolute joint: z x d
+        |d| <= length of the path
+        |d'| <= bound on the velocity of the frame's origin
+        LOCAL: derivative of components along rotating axes
     """
     turning, sliding = column_weights(plan)
     w, p, vel = magnitudes.w[..., None], magnitudes.p[..., None], magnitudes.vel[..., None]
@@ -548,23 +575,29 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 
 @_allow_overflow
 def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
+    """Return the scale of Hessians.
 
-    An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
-    column of the mimicked joint. An entry can therefore be a sum over several pairs. The function adds the
-    scales of these pairs. A lever arm d is never longer than the path.
+    | | |
+    |---|---|
+    | entry | depends on a pair of Jacobian columns |
+    | column of a mimic joint | is added to the column of the mimicked joint |
+    | entry with mimic joints | sum over several pairs; the scales are added |
+    | lever arm d | at most as long as the path |
 
-    Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
-    contains the numbers of products that these steps add:
+    Pinocchio computes an entry from two columns c = [z x d; z] at the world origin (`_PAIR_TERMS`):
 
-    - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
-    - one for the conversion of the result to the frame's origin p: p x (w_1 x w_2)
-    - two for the conversion of a column to p before the product: (v - p x w) x w.
+    | Step of Pinocchio | Products |
+    |---|---|
+    | c_1 x c_2, with linear rows w_1 x v_2 + v_1 x w_2 | 2 |
+    | conversion of the result to the frame's origin p: p x (w_1 x w_2) | 1 |
+    | conversion of a column to p before the product: (v - p x w) x w | 2 |
 
-    In the linear rows, urdfkin computes one product z x (z x d) for LOCAL_WORLD_ALIGNED, and the two products
-    of c_1 x c_2 for LOCAL and WORLD. For LOCAL, urdfkin rotates the two columns by R before the products.
-    Each of the two products has the five factors R, z, R, z and d. The two products together have 10 factors.
-    For LOCAL, the bound allows 12 factors: three products of four factors each.
+    | Reference frame | Linear rows of urdfkin | Factors |
+    |---|---|---|
+    | LOCAL_WORLD_ALIGNED | one product z x (z x d) | |
+    | WORLD | two products of c_1 x c_2 | |
+    | LOCAL | two products of c_1 x c_2, with columns rotated by R | 2 * (R, z, R, z, d) = 10 |
+    | LOCAL, allowed | three products of four factors | 3 * 4 = 12 |
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -587,34 +620,35 @@ def hessian_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Referen
 
 @_allow_overflow
 def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatArray) -> Bound:
-    """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
+    """Return the bound on Jacobians with Euler angles.
 
-    The position rows have the same bound as the rows of the velocity Jacobian. The other three rows give the
-    derivatives of the Euler angles. Let w be the angular part of one column of the velocity Jacobian. The
-    rotation axes of the three angles are e_i, u and t = R e_k (`urdfkin.verify.analytical_reference`). Let s
-    = |e_i x t|, which is the sine or cosine of the middle angle:
+    The position rows have the bound of the velocity Jacobian. The other rows are u . w for the middle angle,
+    and r . w for the first and last angle:
 
-    | Row | Element | Length of the vector |
-    |---|---|---|
-    | middle angle | u . w | 1 |
-    | first or last angle | r . w, r is the reciprocal basis vector of the axis | 1 / s |
+        w: angular part of a column of the velocity Jacobian
+        e_i, u, t = R e_k: first, middle and last axis (`urdfkin.verify.analytical_reference`)
+        s = |e_i x t|: |sine| or |cosine| of the middle angle, in `axis_sine`
+        r: reciprocal basis vector of the first or last axis
+        r': reciprocal basis vector of t
+        delta = k eps: error of t, relative error of w
+        |u| = 1
+        |r| = 1 / s
 
-    Let delta = k eps be the error of t, and also the relative error of w. The error of t rotates u by at most
-    delta / s. Let r' be the reciprocal vector of t. The error of t changes r by the vector -(r . du) u - (r .
-    dt) r'. This vector is at most 2 delta / s^2 long. The errors of the rows are:
+        |du| <= delta / s
+        dr = -(r . du) u - (r . dt) r'
+        |dr| <= 2 delta / s^2
+        first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
+        middle angle: delta / s + delta <= 2 delta / s
 
-    - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
-    - middle angle: delta / s + delta <= 2 delta / s
+        bound on the velocity Jacobian: 2 delta, from two factors
+        scale of the first and last angle: multiplied by 1.5 / s^2
+        scale of the middle angle: multiplied by 1 / s
+        smallest possible s: axis_sine - delta
 
-    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
-    multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
-    the smallest possible value of s, which is `axis_sine` - delta. The functions arctan2 and sine add about 3
-    eps, and products and quotients about 10 eps. The sum is 13 eps. `Magnitudes.roundings` counts one joint
-    more than the path contains. For the additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` =
-    24 eps, which is more than 13 eps.
-
-    `bound` is the bound of the velocity Jacobian. `axis_sine` (n, frames) contains s for the rotations that
-    the oracle computes.
+        arctan2 and sine: about 3 eps
+        products and quotients: about 10 eps
+        sum: 13 eps
+        additional joint in k: at least 24 eps (`PINOCCHIO_ROUNDINGS`) > 13 eps
     """
     s = axis_sine - EPS * magnitudes.roundings
     # Here s is the sine minus its rounding error. If s is not positive, the scale becomes infinite.
@@ -628,40 +662,55 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
 
 
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
-    """Return the error bound (n, frames, 7, nv) of analytical Jacobians for quaternions.
+    """Return the bound on Jacobians with quaternions.
 
-    Analytical Jacobians for quaternions are never singular. The rows of positions have the bound of the
-    velocity Jacobian. Let delta be the error of R. The elements of the matrix 4 q q^T are linear functions of
-    R. The longest row of this matrix has a length of at least 2. The error of this row is below 4.6 delta, so
-    the error of q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an
-    error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|. The angular rows of the velocity
-    Jacobian have the bound 2 delta |w|. Therefore, the derivative of q has the same bound.
+    The position rows have the bound of the velocity Jacobian, and q' has the bound of w:
+
+        delta: error of R
+        elements of 4 q q^T: linear functions of R
+        longest row of 4 q q^T: length >= 2, error < 4.6 delta
+        error of q < 2.3 delta
+        q' = (quaternion product of w and q) / 2
+        error of q' <= (2.3 + 1) / 2 delta |w| < 2 delta |w|
+        bound on the angular rows of the velocity Jacobian: 2 delta |w|
+
+    Jacobians with quaternions are never singular.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the value of |qw| below which rounding can change the sign of a quaternion's qw.
+    """Return the largest |qw| with an uncertain sign.
 
-    Let delta be the error of R, as in `quaternion_jacobian_bound`. The limit 1.5 k eps equals 3 delta. The
-    error of qw is at most 2.3 delta, so the limit is larger than this error.
+    Rounding can change the sign of a smaller |qw|.
+
+    | | |
+    |---|---|
+    | error of R, as in `quaternion_jacobian_bound` | delta |
+    | limit, 1.5 k eps | 3 delta |
+    | error of qw | at most 2.3 delta, below the limit |
     """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def singularity_margin(plan: CompiledTree) -> float:
-    """Return four times the error of a frame's rotation, rad.
+    """Return four times the error of a frame's rotation.
 
-    If Euler angles are closer to a singularity than this margin, no digit of the analytical Jacobian is
-    reliable.
+    Closer to a singularity of Euler angles, no digit is reliable.
+
+    Returns:
+        Angle, rad.
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Return the sums (frames, nv) of |multiplier| over revolute joints and over prismatic joints.
+    """Sum the absolute multipliers for each joint velocity.
 
     An independent joint has the multiplier 1.
+
+    Returns:
+        (frames, nv) sums for revolute and for prismatic joints.
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -679,15 +728,18 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 def find_active_entries(
     plan: CompiledTree, reference: Reference = _ALIGNED, *, root_at_origin: bool = True
 ) -> NDArray[np.bool_]:
-    """Return a bool array (frames, 6, nv) that is False for Jacobian entries that are always 0.
+    """Find the Jacobian entries that can be nonzero.
 
-    A Jacobian entry that is marked False is 0 for every q. In LOCAL and LOCAL_WORLD_ALIGNED, the entry is
-    also 0 for every motion of the base. `root_at_origin` states whether the root link is at the world's
-    origin; only WORLD uses this argument.
+    False entries are 0 for every q. A base motion can change these entries in WORLD only. Only WORLD depends
+    on `root_at_origin`.
 
-    The linear rows of a revolute joint's column are z x d. In WORLD, d leads from the joint to the world's
-    origin. In the other reference frames, d leads from the joint to the frame. The vector d is 0 for every q
-    if all lengths between the ends of d are 0, and no joint between the ends translates.
+        linear rows of a revolute joint: z x d
+        WORLD: d leads from the joint to the world's origin
+        LOCAL, LOCAL_WORLD_ALIGNED: d leads from the joint to the frame
+        d = 0 for every q: all lengths between the ends are 0, and no joint between the ends translates
+
+    Returns:
+        (frames, 6, nv) bool array.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns = plan.steps[:, StepField.KIND] == JointMotion.REVOLUTE

@@ -27,11 +27,12 @@ _PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
 class CallPart(NamedTuple):
-    """A part of a call's configurations, converted for urdfkin and for the oracle.
+    """A part of a call's configurations.
 
-    `rates` is an empty tuple for a placement, (v,) for a velocity, and (v, a) for an acceleration. The arrays
-    v and a have the shape (n, nv). `state` (n or 1, 24) is the state of the moving base. `query` is the input
-    of the oracle. urdfkin's inputs and `query` are converted from the user's arguments independently.
+    Attributes:
+        rates: (), (v,) or (v, a).
+        state: (n or 1, 24) base state.
+        query: Input of the oracle, converted independently.
     """
 
     plan: CompiledTree
@@ -44,11 +45,10 @@ class CallPart(NamedTuple):
 
 
 class Call:
-    """The inputs of one call, converted to batches with one axis.
+    """The inputs of one call.
 
-    `given` contains q, or q and v, or q, v and a. `also` names frames that are computed but not returned.
-
-    Raises InputError for invalid lengths, batch shapes or frames, and UnknownNameError for an unknown name.
+    Args:
+        also: Computed frames outside the result.
     """
 
     def __init__(
@@ -96,7 +96,6 @@ class Call:
             raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
-        """Return an input as an array (n, width); NumPy's broadcasting repeats a single configuration."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -109,11 +108,10 @@ class Call:
         return self.n * len(self.links)
 
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
-        """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
+        """Flatten the batch axes of `out`.
 
-        Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
-        `reshape` of a NumPy matrix may return an unexpected shape. A kernel would then write past the end of
-        the array.
+        A subclass of NumPy's array is invalid, because `reshape` may return another shape.
+        With another shape, a kernel could write past the end of `out`.
         """
         if out is None:
             return None
@@ -135,14 +133,13 @@ class Call:
         return out.reshape(self.n, len(self.links), *shape)
 
     def restore_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the caller's batch shape.
-
-        If the caller gave one name instead of a list of frames, the result has no axis for frames.
-        """
         return result.reshape(*self.shape, *result.shape[1 if self.is_list else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`; if an input is not finite, raise an error with the name of the joint."""
+        """Call `evaluate`.
+
+        The error about a non-finite input names the joint.
+        """
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -157,7 +154,6 @@ class Call:
         return CallPart(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def batch_index(self, k: int) -> tuple[int, ...]:
-        """Convert an index in the flat batch to indices in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
@@ -174,7 +170,6 @@ def _describe_array(out: object) -> str:
 
 
 def _parse_frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and the names of the frames."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

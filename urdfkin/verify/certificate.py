@@ -26,21 +26,21 @@ _ledger_lock = make_fork_safe_lock()
 
 
 class VerificationError(UrdfkinError):
-    """The results of urdfkin and the oracle differ by more than rounding can explain.
+    """The results of urdfkin and the oracle differ by more than rounding.
 
     At least one of the two results is wrong.
 
     Attributes:
         quantity: Name of the quantity.
         frame: Name of the frame.
-        reference: Name of the reference frame. For an analytical Jacobian, name of the rotation's
-            representation, such as "quaternion".
+        reference: Name of the reference frame. For an analytical Jacobian, the representation of the
+            rotation, such as "quaternion".
         index: Index of the worst sample in the batch.
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
-        bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
-        units: Largest difference between `ours` and `theirs`, in multiples of eps * scale.
-        reproduce: A shell command or a line of Python that computes the sample again.
+        bound: Largest allowed difference of each number.
+        units: Largest difference, in multiples of eps * scale.
+        reproduce: Shell command or line of Python that computes the sample again.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.VerificationError, urdfkin.UrdfkinError)
@@ -77,14 +77,13 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class CertificateLine:
-    """One line of a certificate: the data about one quantity.
+    """The line about one quantity in a certificate.
 
     Attributes:
         checked: Number of results that the oracle confirmed.
-        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
-            scale.
+        worst: Largest difference, in multiples of eps * scale.
         bound_ratio: Largest ratio of a difference to its bound.
-        unchecked: Number of results that were not checked.
+        unchecked: Number of results without a check.
     """
 
     quantity: str
@@ -141,7 +140,7 @@ CERTIFICATE = DocumentKind(
 
 @dataclass(frozen=True, slots=True)
 class Certificate(Displayable):
-    """The record of a robot's results so far: which results were checked, and how closely they agree.
+    """The record of a robot's checked and unchecked results.
 
     Attributes:
         robot: The robot's name.
@@ -172,7 +171,7 @@ class Certificate(Displayable):
 
     @property
     def verified(self) -> bool:
-        """True if there are results, and if every result was checked and is within its bound.
+        """True if results exist, and all are checked and within their bounds.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -185,7 +184,9 @@ class Certificate(Displayable):
         )
 
     def as_dict(self) -> CertificateDocument:
-        """Return the certificate as plain data for JSON. A number that is not finite becomes null.
+        """Return the certificate as plain data for JSON.
+
+        A number that is not finite becomes null.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -206,10 +207,12 @@ class Certificate(Displayable):
         return cast("CertificateDocument", as_json_data(document))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the certificate as JSON; if an error occurs, no partial file remains.
+        """Write the certificate as JSON.
+
+        After an error, no partial file remains.
 
         Raises:
-            SourceError: the folder does not exist, or the file cannot be written (permission, disk full).
+            SourceError: the folder does not exist, or the file cannot be written.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -257,13 +260,12 @@ class Certificate(Displayable):
 
 @dataclass(slots=True)
 class Account:
-    """Numbers of checked and unchecked results of one quantity.
+    """Counts the results of one quantity.
 
     Attributes:
-        unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
-        disabled_checks: Number of results of calls with verify=False.
-        counters: A pair (array, index) for each compiled function that computes results without checks. The
-            compiled function increases array[index] by the number of computed results.
+        unchecked: Unchecked results of calls with checks.
+        disabled_checks: Results of calls with verify=False.
+        counters: Pairs (array, index). A compiled function counts unchecked results in array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -282,7 +284,10 @@ class Account:
 
 @dataclass
 class Ledger:
-    """Counts the checked and the unchecked results of a robot. Several threads may use a ledger at once."""
+    """Counts a robot's checked and unchecked results.
+
+    Several threads may use a ledger at once.
+    """
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
@@ -299,7 +304,10 @@ class Ledger:
             account.checked += comparison
 
     def count_unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count results that were not checked; `reason` is None for calls with verify=False."""
+        """Count results without a check.
+
+        `reason` is None for calls with verify=False.
+        """
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:

@@ -1,8 +1,7 @@
 """Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
-differences, because NumPy would take as long as Pinocchio's computation. The kernel and NumPy return equal
-numbers.
+`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes the
+differences, because NumPy takes as long as Pinocchio. The kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ _NO_BITS = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True)
 class BatchComparison:
-    """Comparison of a batch of results (matrices or six-vectors) with the oracle's results.
+    """Comparison of a batch with the oracle's results.
 
     Attributes:
-        worst: Largest difference of two numbers, in multiples of eps * scale.
-        bound_ratio: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
-        index: Index of the result with the largest ratio: one number for each axis of the batch.
+        worst: Largest difference, in multiples of eps * scale.
+        bound_ratio: Largest ratio of difference to bound.
+        index: Index of the result with the largest ratio.
     """
 
     result_count: int = 0
@@ -41,7 +40,7 @@ class BatchComparison:
     def __add__(self, other: BatchComparison) -> BatchComparison:
         """Combine the comparisons of two batches.
 
-        `index` comes from the batch with the larger `bound_ratio`. NaN counts as larger than any number.
+        NaN counts as larger than any number.
         """
         second_is_larger = other.bound_ratio > self.bound_ratio or (
             np.isnan(other.bound_ratio) and not np.isnan(self.bound_ratio)
@@ -64,9 +63,9 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Ba
 
 
 def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the difference of each result with the bound of the result.
+    """Compare the results' differences with the bound.
 
-    `units` contains one difference for each result, in multiples of eps * scale.
+    `units` contains the differences in multiples of eps * scale.
     """
     if not units.size:
         return BatchComparison()
@@ -79,8 +78,7 @@ def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf if `ours`, `theirs` or `scale` is not finite. If the scale is 0 and the two numbers
-    differ, the result is also inf.
+    The difference of unequal numbers is inf if the scale is 0. Numbers that are not finite also give inf.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
     difference = np.abs(ours - theirs)
@@ -89,10 +87,10 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
 
 
 def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest `disagreement` of each result, as an array of shape `ours.shape[:axes]`.
+    """Return the largest disagreement of each result.
 
-    For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be
-    broadcast to the shape of the results.
+    Returns:
+        Array of shape `ours.shape[:axes]`.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
     n, numbers = math.prod(leading), math.prod(own)
@@ -123,7 +121,7 @@ def _as_rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> Flo
 
 
 def load_kernels() -> None:
-    """Compile or load all Numba kernels, so that worker processes need not compile the kernels."""
+    """Compile or load all Numba kernels."""
     preload.load_all_kernels()
     for name in (*CHECK_KERNELS, "lengths"):
         preload.load_kernel(name, KERNELS)

@@ -12,9 +12,9 @@
 `check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
 cannot check the robot.
 
-For a table or a `pinocchio.Model`, urdfkin writes a URDF text. urdfkin and Pinocchio both compute from this
-text, so a comparison of the two results does not find an error in the text. `check_table_source` and
-`check_model_source` find such an error.
+For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both programs compute from this text, so a
+comparison of their results finds no error in the text. `check_table_source` and `check_model_source` find
+such an error.
 """
 
 from __future__ import annotations
@@ -63,19 +63,21 @@ _ROUNDINGS = 16.0
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
+    """Compare the frames of a chain with Pinocchio.
 
-    A joint frame of the chain is the frame before the joint's motion, seen in the direction of the chain.
-    Pinocchio's frame of a joint is the frame of the child link. If the chain leads from the parent link to
-    the child link, Pinocchio's frame is the frame after the joint's motion. The function therefore subtracts
-    the displacement of a prismatic joint. If the chain leads from the child link to the parent link,
-    Pinocchio's frame is the frame before the joint's motion.
+    | Frame of a joint | |
+    |---|---|
+    | chain | frame before the joint's motion, in the direction of the chain |
+    | Pinocchio | frame of the child link |
+    | chain from parent to child | Pinocchio's frame after the motion, minus a prismatic displacement |
+    | chain from child to parent | Pinocchio's frame before the motion |
 
-    Pinocchio computes along two paths: from the root to the first frame of the chain, and from the root to
-    the last frame. urdfkin computes along the chain, which is a part of the two paths. The bound therefore
-    counts the rounding errors of all joints on the two paths. The bound on a position is proportional to a
-    length: the distance from the root to the first frame, plus the length of the chain. The length of the
-    chain includes prismatic displacements.
+    | Bound | |
+    |---|---|
+    | paths of Pinocchio | from the root to the first frame and to the last frame of the chain |
+    | path of urdfkin | the chain, a part of these two paths |
+    | rounding errors | of all joints on the two paths |
+    | length for positions | from the root to the first frame, plus the chain with prismatic displacements |
     """
     if verifier.find_refusal() is not None:
         return None
@@ -156,22 +158,23 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
 def _sample_base_and_tip(
     verifier: Verifier, base: str, tip: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return random configurations, and Pinocchio's placements (n, 4, 4) of base and tip."""
+    """Compute placements at random configurations with Pinocchio.
+
+    Returns:
+        q (n, nq), and base and tip (n, 4, 4).
+    """
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
     T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
     return q, T[:, 0], T[:, 1]
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
-    """Compare rotations that Pinocchio computes from angles or quaternions with the verified rotations `R`.
+    """Compare Pinocchio's rotations with verified rotations.
 
-    `numbers` contains roll, pitch, yaw (n, 3) in rad or quaternions (n, 4), scalar last. `again(k)` returns a
-    command that computes sample k again. The bound includes the distance between `R` and the nearest rotation
-    matrix, because `R` has rounding errors. Raises VerificationError if a rotation differs by more than the
-    bound.
+    Rotation matrices are unique; angles at gimbal lock and signs of quaternions are not. The bound includes
+    the rounding errors of `R`.
 
-    Only the matrices can be compared. At gimbal lock, two correct programs may return different angles for a
-    rotation. Two correct quaternions may have opposite signs.
+    `numbers` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
     """
     pin = pinocchio()
     if numbers.shape[-1] == 3:
@@ -199,9 +202,9 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
 
 
 def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
-    """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
+    """Compare a robot with its source model.
 
-    Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
+    `source` is a pinocchio.Model or a RobotWrapper.
     """
     model, tree = getattr(source, "model", source), verifier.tree
     if model.nv > MAX_NV:  # Pinocchio's memory grows with the cube of nv.
@@ -228,7 +231,7 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
 
 
 def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
-    """Return the model's placements (n, joints + frames, 4, 4)."""
+    """Return the placements of joints, then of frames."""
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
@@ -240,7 +243,13 @@ def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatA
 
 
 def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations (n, model.nq) of the model for the tree's q, with joints matched by name."""
+    """Convert the tree's q to the model's q.
+
+    Joints are matched by name.
+
+    Returns:
+        (n, model.nq) configurations.
+    """
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -257,7 +266,6 @@ def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> Flo
 
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
-    """Compare Pinocchio's placements of the tip with the placements from the robot's table."""
     if verifier.find_refusal() is not None:
         return
     q = sample(verifier.tree, _SAMPLE_COUNT, np.random.default_rng(0))
@@ -280,6 +288,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _orthogonality_defect(table: DHTable) -> float:
-    """Return the sum of the Frobenius norms of R^T R - I over the rotations R of base and tool."""
+    """Sum the Frobenius norms of R^T R - I."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

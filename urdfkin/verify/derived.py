@@ -7,8 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `check_imu` subtracts gravity from
-the oracle's result, in the sensor's axes. urdfkin and `check_imu` therefore use gravity in different ways. A
-wrong sign of gravity, or a wrong order of the steps, causes a disagreement.
+the oracle's result, in the sensor's axes. A wrong sign of gravity, or a wrong order of the steps, therefore
+causes a disagreement.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from urdfkin.verify.oracles import OracleLibrary
 def check_analytical_jacobian(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's analytical Jacobians (n, frames, 6 or 7, nv), and the bound on the difference.
+    """Return an oracle's analytical Jacobians with a bound.
 
-    `compute_bound` computes the bound of the velocity Jacobian.
+    `compute_bound` returns the bound on velocity Jacobians.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
@@ -59,24 +59,21 @@ def check_analytical_jacobian(
 def check_relative_placement(
     compute_bound: Callable[..., Bound], oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's relative placements (n, frames, 4, 4), and the bound on the difference.
+    """Return an oracle's relative placements with a bound.
 
-    `compute_bound` computes the bound of placements in the world. The relative placement is the pose of frame
-    b relative to frame a; frame a is the last frame of `x.plan`.
+    The last frame of `x.plan` is frame a. The placements are the poses of the frames b relative to frame a:
 
-    Let s_a be the length of the path from the world origin to frame a. Let k_a be the number of rounding
-    errors that the bound allows for the placement of frame a. Let s_b and k_b be the corresponding numbers
-    for frame b. The table contains errors in multiples of eps:
+        s_a, s_b: length of the path from the world origin to the frame
+        k_a, k_b: allowed rounding errors of the frame's placement, in eps
 
-    | Number | Source | Error at most |
+    | Number | Source | Error at most, in eps |
     |---|---|---|
     | position R_a^T (p_b - p_a) | p_a and p_b | k_a s_a + k_b s_b |
     | position | R_a | k_a (s_a + s_b) |
     | position | sum | (2 k_a + k_b) (s_a + s_b) |
     | rotation R_a^T R_b | R_a and R_b | k_a + k_b |
-
-    The difference p_b - p_a and the products add about 5 eps. Each of k_a and k_b counts one joint more than
-    the path contains. For the additional joint, the bound allows at least 24 eps, which is more than 5 eps.
+    | both | p_b - p_a and products | about 5 |
+    | both | allowed for the additional joint in k_a and in k_b | at least 24 > 5 |
     """
     other = cast("str", x.options["relative_to"])
     T = oracle.placements(x.query._replace(frames=[*x.query.frames, other]))
@@ -93,7 +90,7 @@ def check_relative_placement(
 def check_imu(
     oracle: Oracle, x: CallPart, ours: FloatArray, library: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's IMU readings (n, frames, 6), and the bound on the difference."""
+    """Return an oracle's IMU readings with a bound."""
     local, (v, a) = Reference.LOCAL, x.rates
     query = x.query._replace(reference=local)
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)

@@ -61,9 +61,10 @@ def _in_eps_scale(difference, size):
 
 @inline_function(fastmath={"nnan", "nsz"})
 def _largest_difference(ours, theirs, scale, i, k):
-    """Return the largest difference between `ours[i]` and `theirs[i]`, in units of eps * `scale[k]`.
+    """Compare two rows of finite numbers.
 
-    The numbers must be finite.
+    Returns:
+        Units of eps * `scale[k]`.
     """
     largest = 0.0
     for j in range(ours.shape[1]):
@@ -73,7 +74,7 @@ def _largest_difference(ours, theirs, scale, i, k):
 
 @inline_function()
 def _has_equal_triples(scale, k):
-    """Return whether the three linear rows of `scale[k]` are equal, and the three angular rows are equal."""
+    """Return whether x, y and z have equal scales."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -84,10 +85,9 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Compare three rows of `ours` and `theirs`; write the largest difference of each column to `units`.
+    """Compare three rows with equal scales.
 
-    The three rows have the same scale. The differences are divided by `unit`, which is eps * scale; a
-    quotient may be NaN or inf.
+    The quotients in `units` may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -101,11 +101,10 @@ def _divide_triples(ours, theirs, unit, width, units):
 
 @inline_function()
 def _largest_bits(x, count):
-    """Return the bit pattern of the largest of `count` doubles.
+    """Return the largest double's bit pattern.
 
-    The doubles are non-negative, inf or NaN. Compared as integers, bit patterns of non-negative doubles have
-    the same order as the doubles. Some processors set the sign bit of NaN, so the function removes the sign
-    bit.
+    Bit patterns of non-negative doubles have the order of the doubles.
+    Some processors set the sign bit of NaN.
     """
     most = 0
     for j in range(count):
@@ -124,14 +123,14 @@ def _largest_bits(x, count):
     WRITABLE_INTS_1D,
 )
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
-    """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
+    """Compare two arrays row by row.
 
-    If `scale` has fewer rows than `out`, the kernel repeats the rows of `scale`, and may use the arrays
-    `unit` and `units` as working memory. `unit` has as many numbers as `scale`. `units` has as many numbers
-    as one row of `scale`. If `scale` has as many rows as `out`, the kernel does not use the working memory.
+    The compiler can vectorize the maximum of integers, but not of doubles.
 
-    `out_bits` and `bits` are views of `out` and `units` as integers. The compiler can vectorize the maximum
-    of integers, but not the maximum of doubles.
+    - `scale`: the rows repeat if `scale` is shorter than `out`
+    - `out`: largest difference in each row, in units of eps * scale; inf for inf or NaN
+    - `unit`, `units`: working memory for `scale` and for one row; used only if the rows repeat
+    - `out_bits`, `bits`: views of `out` and `units` as integers
     """
     known = in_triples = len(scale) < len(out)
     for k in range(len(scale)):
@@ -162,7 +161,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 
 @kernel(FLOATS_2D, INTS_1D, INTS_1D, FLOATS_1D, WRITABLE_FLOATS_1D)
 def coupling(full, columns, index, factor, out):
-    """Add the weighted Jacobian columns of all joints to `out`, which contains zeros at first."""
+    """Add weighted Jacobian columns to `out`."""
     nv = len(out) // max(1, len(full))
     for i in range(len(full)):
         for column in columns:
@@ -185,7 +184,7 @@ def _sum(x, y):
 
 @inline_function()
 def _product(x, y):
-    """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` does."""
+    """Multiply lengths without underflow to 0."""
     return SMALLEST_NORMAL if x * y < SMALLEST_NORMAL and x != 0.0 and y != 0.0 else x * y
 
 
@@ -226,9 +225,9 @@ def _read_row(x, row, at):
 
 @inline_function()
 def _write_scaled(x, first, m, at, factor, to):
-    """Write factor * |x[k, at]| to `to`, for the m rows k = first, first + 1, and so on.
+    """Write scaled absolute values to `to`.
 
-    If `x` has only one row, this row is used m times.
+    A single row is repeated.
     """
     step = 1 if len(x) > 1 else 0
     for i in range(m):
@@ -272,18 +271,17 @@ def _propagate_over_free(before, after, first, m, d, free, at):
     WRITABLE_FLOATS_1D,
 )
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
-    """Write the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes` to `out`.
+    """Compute the lengths of all frames.
 
-    Each of the arrays q, v, a, free and base has a row for each configuration, or one row for all.
+    Each of the arrays q, v, a, free and base has one row or n rows.
 
-    - `links`, for each moving joint: kind, index in q, index in v, and index of the previous moving joint
-    - `sizes`, for each moving joint: length of the path from the previous moving joint, mimic multiplier,
-      offset
-    - `ends`, for each frame: index of the last moving joint before the frame, and index of the frame in `out`
-    - `tips`, for each frame: length of the path from the last moving joint
-    - `free`, for each planar or floating joint: the lengths from `urdfkin.verify.bounds._free_lengths`
-    - `s`: working memory for a block of configurations, with the states of the base and the moving joints,
-      and one additional state
+    - `links`: kind, index in q, index in v, previous moving joint
+    - `sizes`: length from the previous moving joint, mimic multiplier, offset
+    - `ends`: last moving joint before the frame, index in `out`
+    - `tips`: length from the last moving joint
+    - `free`: lengths from `urdfkin.verify.bounds._free_lengths`
+    - `s`: working memory for a block: base, moving joints, one more state
+    - `out`: `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes`
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
     n = len(out) // max(1, _STATE_SIZE * frames)

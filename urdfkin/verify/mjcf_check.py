@@ -46,11 +46,12 @@ _MAX_QUOTE_LENGTH = 300
 
 @dataclass(frozen=True, slots=True)
 class MjcfReading:
-    """The result of reading an MJCF file in a separate process, as plain data.
+    """The robot of an MJCF file, as plain data.
 
-    `remarks` contains elements of the file that the tree does not contain. If MuJoCo did not compile the
-    complete file, the result comes from the file without shapes and inertias. `shapes_refusal` is then the
-    reason, and otherwise None. `pinocchio` is a report about Pinocchio's reader.
+    Attributes:
+        remarks: Elements that the tree lacks.
+        path: None for MJCF text.
+        shapes_refusal: Why MuJoCo rejects the complete file, or None.
     """
 
     urdf: str
@@ -64,11 +65,10 @@ class MjcfReading:
 def read_mjcf(
     source: str | bytes | os.PathLike[str], *, check: bool = True, timeout: float = TIMEOUT
 ) -> MjcfReading:
-    """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
+    """Read an MJCF robot in a separate process.
 
-    MuJoCo also reads included files. If `check` is True, the process also computes the data for
-    `check_mjcf_source`, for example placements. Raises InputError if MuJoCo is missing, rejects the file or
-    exceeds a limit, or if the robot has a ball joint.
+    If `check` is True, the process computes data for `check_mjcf_source`.
+    `timeout` is in seconds.
     """
     version()
     name = source_name(source)
@@ -117,11 +117,7 @@ def _ask_process(request: Mapping[str, Any], timeout: float) -> tuple[list[dict[
 
 
 def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
-    """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
-
-    Raises OracleError if placements or mimic rules differ by more than the bound. A missing or an additional
-    joint equality in MuJoCo's model also raises OracleError.
-    """
+    """Compare a robot with MuJoCo's model."""
     tree, answer = verifier.tree, reading.answer
     q = unpack_array(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
@@ -151,7 +147,11 @@ def check_mjcf_source(verifier: Verifier, reading: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio of error to bound over all mimic rules; None if there are no rules."""
+    """Compare mimic rules with MuJoCo's joint equalities.
+
+    Returns:
+        Largest ratio of error to bound; None without rules.
+    """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())

@@ -60,9 +60,9 @@ def serve() -> None:
 
 
 def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
-    """Return an answer that describes `error`; `parse_answers` raises InputError for this answer.
+    """Return an answer that describes `error`.
 
-    `what` is the message of the InputError if `error` is not an UrdfkinError.
+    `what` is the message for exceptions of libraries.
     """
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
@@ -83,11 +83,10 @@ def write_answer(answer: Mapping[str, Any]) -> None:
 def parse_answers(
     output: bytes, status: int | None, *, library: str, name: str, timeout: float
 ) -> tuple[list[dict[str, Any]], str]:
-    """Return the answers that a process wrote, and a text about the end of the process.
+    """Parse the output of a process.
 
-    The text explains why answers may be missing. Each answer is a line of JSON. The function skips incomplete
-    lines and the lines that libraries print. A `status` of None means that the process ran longer than
-    `timeout` (s). Raises InputError if the process reports an error.
+    Returns:
+        The answers, and why others may be missing.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -103,13 +102,6 @@ def parse_answers(
 
 
 def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the answers to a request.
-
-    The entry `path` of the request is the path of the MJCF file, or None. If `path` is None, the entry `text`
-    is the MJCF text. The entry `name` appears in messages. If the entry `samples` is 0, the answers contain
-    no placements. Otherwise, the answers contain the placements at the zero configuration and at `samples`
-    random configurations.
-    """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
     read = read_mjcf(source, request["name"])
@@ -180,9 +172,9 @@ def _compute_with_pinocchio(path: str, read: Mjcf, q: FloatArray) -> dict[str, A
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return Pinocchio's placements (n, bodies, 4, 4) for an MJCF file at MuJoCo's `qpos`.
+    """Return Pinocchio's placements of the bodies.
 
-    `coordinates` maps a joint's name to the index of the joint's first number in `qpos`.
+    `coordinates` contains each joint's first index in `qpos`.
     """
     pin = pinocchio()
     try:
@@ -213,11 +205,9 @@ def _pinocchio_placements(
 
 
 def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Yield the name of each joint with its index in q and its number of coordinates.
+    """Yield each joint's name, index in q and size.
 
-    If a body has several joints, Pinocchio combines these joints into one composite joint. For example,
-    Pinocchio combines the joints `x` and `y` into the joint `Composite_x`. In Pinocchio's q, each of the
-    combined joints has one number.
+    Pinocchio combines the joints of a body into one composite joint.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -72,12 +72,12 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """The indices of one moving joint in MuJoCo's and in urdfkin's vectors, and the joint's mimic rule.
+    """First indices of a moving joint.
 
-    Each index is the index of the joint's first element. `qpos` and `qvel` are indices in MuJoCo's vectors.
-    `q` and `v` are indices in urdfkin's vectors. An index is -1 if urdfkin's vector has no value for the
-    joint. For a moving base, `q` and `v` are -1. For a locked joint, `v` is -1, `multiplier` is 0, and
-    `offset` is the locked value.
+    Attributes:
+        q: -1 for a moving base.
+        v: -1 for a moving base or locked joint.
+        offset: Value of a locked joint.
     """
 
     kind: str
@@ -262,10 +262,10 @@ class MujocoOracle(Oracle):
     def _compute_poses(
         self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]
     ) -> FloatArray:
-        """Return placements (n, frames, 4, 4).
+        """Return the placements of all frames.
 
-        The method calls `read(body, (k, f))` for each sample k and frame f. MuJoCo receives the first `count`
-        of the inputs q, v and a. `read` can read further results from `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a.
+        The function `read` reads further results from `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
@@ -288,7 +288,6 @@ class MujocoOracle(Oracle):
         return out
 
     def _read_jacobian(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return the Jacobian (6, MuJoCo's nv) of the body's origin, [linear; angular]."""
         J = np.zeros((6, self._model.nv))
         linear, angular = np.zeros((3, self._model.nv)), np.zeros((3, self._model.nv))
         function(self._model, self.data, linear, angular, self.data.xpos[body], body)
@@ -296,7 +295,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
+        """Read the velocity or acceleration of a body."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
@@ -344,11 +343,7 @@ class MujocoOracle(Oracle):
         return qpos, rates, second
 
     def _velocity_matrix(self, q: FloatArray) -> FloatArray:
-        """Return the matrices S that convert urdfkin's v to MuJoCo's qvel: qvel = S v.
-
-        The shape is (n, MuJoCo's nv, nv). If S is the same in all configurations, the first axis has the
-        length 1.
-        """
+        """Return S with qvel = S v."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, v = joint.qvel, joint.v
@@ -364,7 +359,10 @@ class MujocoOracle(Oracle):
         return S
 
     def _velocity_matrix_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative S' of S, computed from R' = R [w]x of floating and planar joints."""
+        """Return the time derivative of S.
+
+        For floating and planar joints, R' = R [w]x.
+        """
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, first = joint.qvel, joint.v
@@ -378,9 +376,10 @@ class MujocoOracle(Oracle):
 
 
 def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a floating or planar joint's rotation, and the number of slide joints that replace the joint.
+    """Return a joint's rotations.
 
-    The rotation has the shape (n, 3, 3) for a floating joint, and (n, 2, 2) for a planar joint.
+    Returns:
+        Rotations (n, k, k), and the number k of slide joints.
     """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
@@ -395,10 +394,9 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
 
 
 def _move_mass_to_root(model: Any, root: str) -> Any:
-    """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
+    """Move all mass to the root.
 
-    MuJoCo computes velocities at the centre of mass. With the centre of mass at the root's origin, MuJoCo
-    computes lever arms of length zero exactly.
+    With the mass at the root, MuJoCo computes zero lever arms exactly.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -412,7 +410,10 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
+    """Return the joints depth first, and the links.
+
+    Siblings are sorted by name.
+    """
     robot = parse_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
     children, child_links = dict[str, list[_Joint]](), set[str]()
@@ -449,7 +450,6 @@ def _scalar_first(quaternion: FloatArray) -> FloatArray:
 
 
 def _rotation(quaternion: FloatArray) -> FloatArray:
-    """Return rotations (..., 3, 3) of unit quaternions (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -462,7 +462,7 @@ def _rotation(quaternion: FloatArray) -> FloatArray:
 def _change_reference(
     reference: Reference | str, poses: FloatArray, values: FloatArray, *, columns: bool = False
 ) -> FloatArray:
-    """Convert six-vectors, or Jacobian columns, from LOCAL_WORLD_ALIGNED to another reference frame."""
+    """Convert values from LOCAL_WORLD_ALIGNED to another reference frame."""
     six = values if columns else values[..., None]
     linear, angular = six[..., :3, :], six[..., 3:, :]
     match Reference.of(reference):

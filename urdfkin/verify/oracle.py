@@ -51,7 +51,10 @@ from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint in `joints`, as a function of an independent joint."""
+    """Read the mimic rules of `joints`.
+
+    All rules refer to independent joints.
+    """
     if "mimic" not in text:
         return {}
     rules = {
@@ -63,9 +66,9 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 
 
 def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
-    """Resolve chains of mimic rules, so that each rule refers to an independent joint.
+    """Resolve chains of mimic rules.
 
-    A chain of rules gives q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
+    q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1
     """
     known: dict[str, Mimic] = {}
     for joint in rules:
@@ -84,7 +87,7 @@ def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
 
 
 def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
-    """Return the values of the locked joints and of all joints that mimic a locked joint.
+    """Return the values of all locked joints.
 
     >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
@@ -104,10 +107,14 @@ _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """Indices of one joint in the vectors of Pinocchio and of urdfkin.
+    """First indices of a joint.
 
-    `full_q` and `full_v` are the indices of the joint's first numbers in Pinocchio's vectors. `q` and `v` are
-    the same indices in urdfkin's vectors. For a mimic joint, `q` and `v` belong to the mimicked joint.
+    A mimic joint has the `q` and `v` of the mimicked joint.
+
+    Attributes:
+        sizes: (nq, nv) in Pinocchio.
+        full_q: Index in Pinocchio's q.
+        full_v: Index in Pinocchio's v.
     """
 
     sizes: tuple[int, int]
@@ -120,10 +127,10 @@ class _JointIndices(NamedTuple):
 
 
 class PinocchioLayout:
-    """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's columns.
+    """Converts between Pinocchio's and urdfkin's layouts.
 
-    `joints` contains Pinocchio's joint indices, and `rules` the resolved mimic rules. `rate_columns` lists
-    the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
+    Attributes:
+        rate_columns: Columns of all moving joints.
     """
 
     def __init__(
@@ -177,7 +184,7 @@ class PinocchioLayout:
         )
 
     def convert_q(self, q: FloatArray) -> FloatArray:
-        """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
+        """Convert q to Pinocchio's layout."""
         if self._same_q:
             return np.ascontiguousarray(q)
         full = np.zeros((len(q), self._model.nq))
@@ -198,7 +205,7 @@ class PinocchioLayout:
         return full
 
     def convert_rates(self, v: FloatArray) -> FloatArray:
-        """Return v_full = G v, Pinocchio's joint velocities (n, model.nv) for v (n, nv)."""
+        """Return v_full = G v."""
         if self._same_v:
             return np.ascontiguousarray(v)
         if not self.nv:
@@ -207,7 +214,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return the Jacobian J_full G for urdfkin's v, without the base's columns."""
+        """Return J_full G, without the base's columns."""
         if self._same_v:
             return full
         return couple_columns(full, self._columns, self._index, self._factor, self.nv)
@@ -221,9 +228,10 @@ _PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
 class Frames:
     """An oracle's frames by name.
 
-    `bodies` and `joints` map names to frame indices. `parents` maps the frame of a link to the frame of the
-    link's parent joint. If a link has no entry in `parents`, the link's frame and the joint's frame have the
-    same index.
+    Args:
+        bodies: Frame index of each link.
+        joints: Frame index of each joint.
+        parents: Frame of the parent joint for each link frame. A missing entry means equal indices.
     """
 
     def __init__(
@@ -238,7 +246,6 @@ class Frames:
         self._bodies, self._joints, self._parents = bodies, joints, parents
 
     def find_index(self, name: str) -> int:
-        """Return the index of a frame; raise OracleError for an unknown or ambiguous name."""
         if isinstance(name, LinkFrame):
             return self._find_index(self._bodies, name, str(name)[5:])
         if isinstance(name, JointFrame):
@@ -264,9 +271,9 @@ class Frames:
 
 
 def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Frames:
-    """Return the frames of a Pinocchio model.
+    """List a Pinocchio model's frames.
 
-    If `includes_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
+    If `includes_world` is True, Pinocchio's world is the link `WORLD`.
     """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
@@ -279,9 +286,9 @@ def make_pinocchio_frames(model: Any, pin: Any, *, includes_world: bool) -> Fram
 
 
 class BaseNumbers(Protocol):
-    """Placement, velocity and acceleration of the base, as given by the user.
+    """The user's motion of the base.
 
-    The leading axes of each array are the axes of the batch.
+    Leading axes are batch axes.
     """
 
     @property
@@ -298,25 +305,31 @@ class BaseNumbers(Protocol):
 
 
 def free_flyer(base: BaseNumbers) -> FloatArray:
-    """Return x, y, z, qx, qy, qz, qw of the base, (..., 7)."""
+    """Return x, y, z, qx, qy, qz, qw of the base."""
     T = np.asarray(base.placement)
     return np.concatenate((T[..., :3, 3], nearest_quaternion(T[..., :3, :3])), axis=-1)
 
 
 def free_flyer_velocity(base: BaseNumbers) -> FloatArray:
-    """Return the base's velocity in the axes of the base, (..., 6)."""
+    """Return the base's velocity in the base's axes."""
     return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
 def free_flyer_acceleration(base: BaseNumbers) -> FloatArray:
-    """Return the base's spatial acceleration, acc - w x vel, in the axes of the base, (..., 6)."""
+    """Return the base's spatial acceleration in the base's axes.
+
+    The linear part is acc - w x vel.
+    """
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
     return _rotate_to_base_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
 
 
 def nearest_quaternion(M: FloatArray) -> FloatArray:
-    """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
+    """Return the unit quaternion of the nearest rotation.
+
+    The scalar is the last component.
+    """
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Rounding adds small components along other eigenvectors of K.
@@ -327,7 +340,10 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 
 
 def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); K = 4 q q^T - I for a rotation M."""
+    """Return Davenport's matrix K of M.
+
+    K = 4 q q^T - I for a rotation M
+    """
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -339,10 +355,12 @@ def davenport_matrix(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _rotate_to_base_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate the linear part and the angular part y of each six-vector by R^T.
+    """Rotate the parts of each six-vector by R^T.
 
-    Let u be the vector part and w the scalar part of the quaternion. With c = y x u,
-    R^T y = y + 2 w c + 2 (c x u).
+    u, w: vector and scalar part of the quaternion
+    y: linear or angular part
+    c = y x u
+    R^T y = y + 2 w c + 2 (c x u)
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     y = six.reshape(*six.shape[:-1], 2, 3)
@@ -361,7 +379,7 @@ _VELOCITY_SUFFIXES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "
 
 
 class _CoordinateNames:
-    """Map names of joints and coordinates to indices in q or v.
+    """Maps names of joints and coordinates to indices.
 
     >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _Q_SUFFIXES)
     >>> names.find_index("base.y"), names.find_index("base"), names.find_index("elbow")
@@ -377,7 +395,6 @@ class _CoordinateNames:
             at += len(suffixes.get(rates, "1"))
 
     def find_index(self, name: str) -> int | slice:
-        """Return a coordinate's index or a joint's slice; raise OracleError for an unknown name."""
         if name in self._joints:
             at, suffixes = self._joints[name]
             return slice(at, at + len(suffixes)) if suffixes else at
@@ -411,7 +428,13 @@ def _parse_number(text: str) -> float:
 
 
 class BaseRows(NamedTuple):
-    """Placement (n, 4, 4), velocity (n, 6) and acceleration (n, 6) of the base for n configurations."""
+    """The base's motion in n configurations.
+
+    Attributes:
+        placement: (n, 4, 4).
+        velocity: (n, 6).
+        acceleration: (n, 6).
+    """
 
     placement: FloatArray
     velocity: FloatArray
@@ -419,15 +442,13 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """The arguments that an oracle receives for n configurations.
+    """The arguments of an oracle for n configurations.
 
-    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `frames_are_joints` is True,
-    `frames` contains `JointFrame` objects. In this case, Pinocchio computes Jacobians and J-dot with the
-    functions for joints, not with the functions for frames.
+    Pinocchio's functions for one and for several frames may round differently.
 
-    Pinocchio's function for a single frame may round differently from Pinocchio's function for several
-    frames. If `is_partial` is True, `frames` is a part of a longer list of frames. Pinocchio then uses the
-    function for several frames, even if `frames` contains one frame.
+    Attributes:
+        frames_are_joints: Whether Pinocchio uses functions for joints.
+        is_partial: Whether a longer list contains `frames`.
     """
 
     frames: Sequence[str]
@@ -451,10 +472,11 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The user's arguments of one call. The method `select` converts the arguments for an oracle.
+    """The user's arguments of one call.
 
-    `named_inputs` has an entry for each input: the user's text or mapping with names, or None for an array.
-    `joints` lists the name and the number of joint velocities of each joint that has coordinates.
+    Args:
+        named_inputs: Texts or mappings; None for arrays.
+        joints: Pairs (name, nv).
     """
 
     def __init__(
@@ -472,9 +494,9 @@ class OracleQuery:
         self._arrays, self._named, self._joints = inputs, named_inputs or [None] * len(inputs), joints
 
     def convert_inputs(self) -> None:
-        """Convert the inputs before the computation writes to `out`.
+        """Convert the inputs before `out` changes.
 
-        The array `out` may share memory with an input.
+        The caller's `out` may share memory with an input.
         """
         _ = self._inputs
 
@@ -517,7 +539,7 @@ class OracleQuery:
         return math.prod(self.shape)
 
     def select(self, part: slice | IntArray) -> QueryBatch:
-        """Return the configurations with the indices `part` in the flat batch (C order)."""
+        """Select configurations by flat indices."""
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
             batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
@@ -533,10 +555,9 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flatten_result(self, result: FloatArray, axes: int) -> FloatArray:
-        """Return `result` in the shape (n, frames, ...).
+        """Flatten a result's batch axes.
 
-        `axes` is the number of axes of the result for one configuration and one frame. Raises OracleError if
-        the shape of `result` does not match the arguments.
+        An unexpected shape raises OracleError.
         """
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
@@ -556,18 +577,18 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 
 
 class Oracle:
-    """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
+    """A library's results in urdfkin's layout.
 
-    A subclass builds the library's model in `__init__`. An oracle takes only names and sizes from `tree`, no
-    geometry. Results have the shape (n, frames, ...).
+    An oracle takes only names and sizes from `tree`.
+    Results have the shape (n, frames, ...).
 
-    `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
-    that the user has added: "floating" or "planar"; None without such a joint. The tree contains the root
-    joint, but the text does not. `lock` contains the values (rad or m) of locked joints. `new_data` returns a
-    new data structure of the library, for one thread.
+    Args:
+        moving_base: A free-flyer moves the root.
+        root_joint: Kind of an added root joint. The text does not contain this joint.
+        lock: Values of locked joints, rad or m.
 
-    Raises OracleError if the library does not accept the text, or if the library's joints differ from the
-    joints of `tree`.
+    Attributes:
+        new_data: Makes the data for one thread.
     """
 
     title: ClassVar[str]
@@ -588,9 +609,10 @@ class Oracle:
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
     def read_rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of `joints`, the library's moving joints.
+        """Return the joints' mimic rules.
 
-        Raises OracleError if the tree has other joints, or has the joints in another order.
+        Raises:
+            OracleError: the tree has other joints or another order.
         """
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -630,20 +652,22 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians in blocks of configurations; each block may overwrite the previous block."""
+        """Yield the Jacobians in blocks.
+
+        Each block may overwrite the previous block.
+        """
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
         raise NotImplementedError
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Hessians (n, frames, 6, nv, nv); raise OracleError if the library computes none."""
         raise OracleError(
             f"{self.title} computes no Hessian", where=self.tree.name, remedy="use oracle='pinocchio'"
         )
 
     def quaternions(self, x: QueryBatch) -> FloatArray:
-        """Return the quaternions (n, frames, 4) of the placements, scalar last, with qw >= 0."""
+        """Return quaternions with qw >= 0, scalar last."""
         out = nearest_quaternion(self.placements(x)[..., :3, :3])
         return np.where(out[..., 3:] < 0.0, -out, out)
 
@@ -651,11 +675,10 @@ class Oracle:
 def couple_columns(
     full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int
 ) -> FloatArray:
-    """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
+    """Return the product J_full G.
 
-    Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
-    product. The function adds only the columns of J_full that `columns` lists, in the order of `columns`. The
-    kernel and NumPy return identical results.
+    The kernel and NumPy return identical results.
+    `columns` lists the added columns of J_full, in this order.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:

@@ -20,12 +20,11 @@ OracleName = Literal["pinocchio", "mujoco"]
 
 @dataclass(frozen=True, slots=True)
 class OracleLibrary:
-    """An oracle: a library that reads the URDF text and computes the quantities that urdfkin computes.
+    """A library that checks urdfkin's results.
 
-    `make_oracle` is a function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the model
-    of a robot. `adapt_magnitudes` is a function that converts error bounds. The argument of
-    `adapt_magnitudes` contains the `Magnitudes` for a comparison with Pinocchio. The result contains the
-    `Magnitudes` for a comparison with this library.
+    Attributes:
+        make_oracle: Constructor of an `Oracle`.
+        adapt_magnitudes: Converts `Magnitudes` from Pinocchio to this library.
     """
 
     name: OracleName
@@ -67,10 +66,6 @@ def _library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with the given name.
-
-    Raises UnknownNameError for an unknown name, and InputError if MuJoCo is the oracle and is not installed.
-    """
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
@@ -80,10 +75,6 @@ def oracle_library(name: object) -> OracleLibrary:
 
 
 def version(package: str) -> str:
-    """Return the version of a package.
-
-    If the package is not installed, return "not installed", or "a checkout" if the package is urdfkin.
-    """
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

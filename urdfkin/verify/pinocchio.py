@@ -47,7 +47,7 @@ _REQUIREMENT = "'pin>=4,<5'"
 
 
 def pinocchio() -> Any:
-    """Return Pinocchio's module; raise InstallationError if Pinocchio is missing or unsupported."""
+    """Import a supported version of Pinocchio."""
     try:
         import pinocchio as module
     except ImportError as error:
@@ -73,7 +73,6 @@ def pinocchio() -> Any:
 
 
 def version() -> str:
-    """Return the version of Pinocchio; "not installed" if no supported version is installed."""
     try:
         return str(pinocchio().__version__)
     except InstallationError:
@@ -136,13 +135,10 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     lock_mimic_joints: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
+    """Build Pinocchio's model of a URDF text.
 
-    Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
-    is therefore rejected. A long chain of links is parsed with a larger stack.
-
-    `root_joint` is "floating", "planar", or None for a fixed root. The values in `lock` are in rad or m. If
-    `lock_mimic_joints` is True, the joints that mimic a locked joint are also locked.
+    Without enough memory or stack, Pinocchio would crash the process.
+    `lock` contains joint values in rad or m.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MAX_NV:
@@ -221,7 +217,11 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _add_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
+        """Add a free-flyer as the base.
+
+        Returns:
+            New joint indices and frame indices.
+        """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects links with the name of a joint.
         # All joints and frames therefore get unique names.
@@ -249,10 +249,7 @@ class PinocchioOracle(Oracle):
         return self._pin.ReferenceFrame.names[name]
 
     def _convert_inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
-        """Convert the first `count` of urdfkin's inputs q, v and a to Pinocchio's vectors.
-
-        If the base moves, the velocity and the spatial acceleration of the free-flyer are in the base's axes.
-        """
+        """Convert the first `count` inputs to Pinocchio's vectors."""
         q, *v_and_a = x.inputs[:count]
         full = [self._layout.convert_q(q), *map(self._layout.convert_rates, v_and_a)]
         if self.moving_base:
@@ -331,15 +328,11 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Hessians (n, frames, 6, nv, nv) by `getFrameKinematicHessian`.
+        """Return Hessians without two errors of Pinocchio 4.1.
 
-        Two errors of Pinocchio 4.1 are corrected:
-
-        - The returned NumPy array has C order, but the numbers are in Eigen's order: the first index varies
-          fastest.
-        - In LOCAL, Pinocchio may return a nonzero entry [i, j] for two velocities i and j of the same joint.
-          The true value is 0, because a joint's motion does not change the joint's own Jacobian columns in
-          the axes of the frame.
+        - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
+        - In LOCAL, two velocities of one joint may have a nonzero entry. The true value is 0, because a
+          joint's motion does not change the joint's own columns.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv
@@ -359,7 +352,7 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the columns (n, 6, columns) of Pinocchio's joint Jacobian, mimic joints included."""
+        """Return the joint Jacobian's columns, including mimic joints."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes for a Jacobian without columns.
@@ -383,7 +376,7 @@ class PinocchioOracle(Oracle):
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return results (n, ids, *shape): call `compute` for each configuration, then `get` for each id."""
+        """Return results (n, ids, *shape)."""
         model, data, steps = self._model, self.data, self._map_configurations(compute, inputs)
         return _stack_results(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
@@ -399,10 +392,10 @@ def _stack_results(compute: _NextResults, *shape: int) -> FloatArray:
 
 
 def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[FloatArray]:
-    """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
+    """Yield results in blocks of `memory`.
 
-    If `memory` has fewer than n rows, later blocks overwrite earlier blocks in `memory`. Empty results are
-    not computed, because Pinocchio 4.1 crashes the process for a Jacobian without columns.
+    Later blocks may overwrite earlier blocks.
+    Pinocchio 4.1 crashes the process for a Jacobian without columns.
     """
     if 0 in memory.shape:
         yield memory
@@ -418,12 +411,11 @@ def _blocks(compute: _NextResults, n: int, memory: FloatArray) -> Iterator[Float
 
 
 def _block_length(*shape: int) -> int:
-    """Return how many configurations fit in a block; `shape` is the shape of one configuration's result."""
     return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
 
 
 def tree_depth(tree: KinematicTree) -> int:
-    """Return the largest number of joints on a path from the root."""
+    """Return the number of joints on the longest path."""
     depths = [0]
     for joint in tree.joints:
         depths.append(depths[joint.parent] + 1)

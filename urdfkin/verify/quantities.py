@@ -47,33 +47,22 @@ _bound = lazy_import("urdfkin.verify.bounds:make_bound")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Quantity:
-    """A row of the table: the data of one quantity, for example the velocity of a frame.
+    """A row of the table.
 
     Attributes:
-        inputs: The inputs of the quantity: "q", "qv" or "qva".
-        shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
-        compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
-            frames, ...). If `recursive` is False, `compute` may have other arguments.
-        ask_oracle: Function (oracle, query) that returns the oracle's results (n, frames, ...).
-        blocks: Function (oracle, query) that yields the oracle's results in blocks. Each block contains the
-            results for some of the configurations.
-        scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
-        factors: Each number of a result is a sum of terms, and each term is a product of rotated vectors, the
-            factors. `factors` is the largest number of factors in a term for LOCAL_WORLD_ALIGNED.
-        results_and_bound: Function (oracle, part, ours, library) that returns the oracle's results and the
-            bound. If `results_and_bound` is not None, the checks use `results_and_bound` instead of
-            `ask_oracle` and `scale`.
-        compute_intervals: Function (motion, link, reference) that returns intervals. Each interval contains
-            the true value of one number of the result.
-        recursive: True if the forward recursion computes the quantity from `inputs`, without other arguments
-            such as gravity.
-        in_validation: True if `validate`, the accuracy study and plots include the quantity. The Hessian is
-            not included, because a Hessian has nv times as many numbers as a Jacobian.
-        has_reference: True if the quantity depends on a reference frame.
-        object_kind: A validation compares the quantity for each object of this kind: "frames", "joints" or
-            "columns".
-        heading: Heading of the quantity's column in reports; several quantities may have the same column.
-        help_text: Help text of the command, without the summary.
+        inputs: "q", "qv" or "qva".
+        shape: Shape of one result, for example (6, "nv").
+        compute: Function (plan, *inputs, reference, base=, out=, threads=) of urdfkin.
+        ask_oracle: Function (oracle, query) for the oracle's results.
+        blocks: Function (oracle, query) that yields blocks of results.
+        scale: Function (plan, magnitudes, reference) for the scale of the bound.
+        factors: Largest number of factors in a term, for LOCAL_WORLD_ALIGNED.
+        results_and_bound: Function (oracle, part, ours, library), replaces `ask_oracle` and `scale`.
+        compute_intervals: Function (motion, link, reference) for intervals around true values.
+        recursive: Whether the forward recursion needs only `inputs`.
+        in_validation: False for Hessians, which are nv times larger than Jacobians.
+        object_kind: Compared objects: "frames", "joints" or "columns".
+        heading: Column in reports; quantities can share a column.
     """
 
     name: str
@@ -373,9 +362,10 @@ def quantities_by_command() -> dict[str, Quantity]:
 
 
 def find_quantity(name: str) -> Quantity:
-    """Return the quantity that has this name.
+    """Return the quantity with this name.
 
-    For an unknown name, raises UnknownNameError with the nearest names.
+    Raises:
+        UnknownNameError: no such quantity.
     """
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
@@ -385,7 +375,9 @@ def find_quantity(name: str) -> Quantity:
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return the shell command that computes one sample again, with all digits of the numbers.
+    """Return a shell command that repeats a sample.
+
+    The command contains all digits of the numbers.
 
     >>> from urdfkin.urdf.sources import Origin
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})

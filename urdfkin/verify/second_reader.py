@@ -50,11 +50,12 @@ _VELOCITY_EFFORT = ("velocity", "effort")
 
 @dataclass(frozen=True, slots=True)
 class SecondReading:
-    """Result of the comparison with yourdfpy's tree.
+    """The comparison with yourdfpy's tree.
 
-    `joints` is the number of joints, fixed joints included. `differences` lists the differences that no known
-    fault of yourdfpy explains. `known` lists known faults of yourdfpy, each with the names of the affected
-    joints. `unread` is the reason why there is no comparison.
+    Attributes:
+        differences: Differences without a known cause.
+        known: Known faults, with joint names.
+        unread: Why there is no comparison.
     """
 
     by: str
@@ -67,10 +68,9 @@ class SecondReading:
 def compare_with_yourdfpy(
     text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
 ) -> SecondReading:
-    """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
+    """Compare yourdfpy's tree with urdfkin's tree.
 
-    If `mimic` is False, the mimic rules are not compared. If `root_joint` is True, `load` has added the first
-    joint and the first link of the tree. The URDF text does not contain this joint and this link.
+    If `root_joint` is True, `load` has added the tree's first joint.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # yourdfpy would read files that the document type names.
@@ -108,7 +108,10 @@ def compare_with_yourdfpy(
 
 
 def read_with_yourdfpy(text: str) -> yourdf.Robot:
-    """Read a URDF text with yourdfpy, without meshes; yourdfpy may raise any exception."""
+    """Read a URDF text without meshes.
+
+    yourdfpy may raise any exception.
+    """
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # An XML declaration may name another encoding than UTF-8.
@@ -125,10 +128,10 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
 def _compare_joints(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield two texts for each difference between urdfkin's joint and yourdfpy's joint.
+    """Yield the differences between two joints.
 
-    The first text describes the difference. The second text names a known fault of yourdfpy that explains the
-    difference. If no known fault explains the difference, the second text is empty.
+    Yields:
+        A difference, and a known fault or an empty text.
     """
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
@@ -155,7 +158,7 @@ def _compare_joints(
 
 
 def _read_limit(joint: yourdf.Joint) -> dict[str, float] | None:
-    """Return yourdfpy's limit; the default value of the URDF specification replaces a missing number."""
+    """Return the limit with the URDF's default values."""
     if joint.limit is None:
         return None
     bounded = joint.type in _BOUNDED_KINDS
@@ -176,7 +179,6 @@ def _read_mimic_rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, obj
 
 
 def _find_quaternion_joints(text: str) -> set[str]:
-    """Return the names of the joints whose origin has the attribute quat_xyzw."""
     if "quat_xyzw" not in text:
         return set()
     return {

@@ -1,16 +1,19 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
-*Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
-|E| in the spectral norm. This module uses the Frobenius norm of E, which is at least as large as the spectral
-norm. The matrix E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the
-decomposition.
+*Error of J and residual.* Weyl's inequality limits the change of a singular value s_k:
 
-*Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
-By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor. The factor is
-between (1 - a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
+    |s_k(J + E) - s_k(J)| <= spectral norm of E <= Frobenius norm of E
+    E = error of J (`urdfkin.verify.bounds`) + residual J - U S V^T of the decomposition
 
-*Rounding.* The computed residuals have rounding errors too. The error of a sum of m products is at most m eps
-times the sum of the absolute values of the products.
+*Orthogonality.* The computed U and V are not exactly orthogonal. Ostrowski's theorem limits the effect:
+
+    |U^T U - I| <= a,  |V^T V - I| <= b
+    s_k(U S V^T) = factor * s_k(S)
+    (1 - a)^(1/2) (1 - b)^(1/2) <= factor <= (1 + a)^(1/2) (1 + b)^(1/2)
+
+*Rounding.* The computed residuals have rounding errors too:
+
+    error of a sum of m products <= m eps * (sum of the absolute values of the products)
 
 *Range.* No intermediate value leaves the range of doubles: the numbers of a norm are divided by the largest
 number, and products are computed from mantissas and exponents.
@@ -39,7 +42,7 @@ _MAX_ROWS = 10
 
 
 class BoundedArray(NamedTuple):
-    """A computed value and guaranteed bounds on the true value, as three arrays of the same shape."""
+    """A computed value, with bounds on the true value."""
 
     value: FloatArray
     lower: FloatArray
@@ -48,18 +51,17 @@ class BoundedArray(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SingularValues(Displayable):
-    """Singular values of some rows of a Jacobian. Columns that are 0 in every configuration are left out.
+    """Singular values of some rows of a Jacobian.
 
-    `print` and notebooks display the singular values as a table, and explain a singularity.
+    Columns that are 0 in every configuration are left out. `print` and notebooks display a table. For a
+    single configuration, the display explains a singularity.
 
     Attributes:
-        rows: The rows of the Jacobian that are used, as a slice.
-        values: (..., k) the singular values, largest first; k is the smaller of the numbers of rows and
-            columns.
+        rows: The chosen rows of the Jacobian, as a slice.
+        values: (..., k) singular values, largest first; k = min(rows, columns).
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
-        V: (..., nv, k) right singular vectors, directions of v; 0 for a joint that does not move the frame.
-        frame_jacobian: The Jacobian with the names of the frame and of the joints; None if the matrix is not
-            a robot's Jacobian.
+        V: (..., nv, k) right singular vectors, directions of v. Left-out columns have 0.
+        frame_jacobian: The Jacobian with names, or None for another matrix.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -108,10 +110,10 @@ class SingularValues(Displayable):
         return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
 
     def singularity(self, *sample: int) -> Singularity:
-        """Return the rank in one configuration, with the lost directions and the joints that cause the loss.
+        """Explain a loss of rank in one configuration.
 
         Args:
-            sample: Indices of the configuration in the batch. For a single configuration, give no indices.
+            sample: Indices of the configuration in the batch. Give no indices for a single configuration.
 
         Raises:
             InputError: the wrong number of indices, or an index that does not exist.
@@ -152,8 +154,7 @@ class SingularValues(Displayable):
     def condition(self) -> BoundedArray:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        If the lower bound on the smallest singular value is 0, the upper bound on the condition number is
-        inf.
+        The upper bound is inf if the smallest value may be 0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -177,12 +178,10 @@ class SingularValues(Displayable):
         return BoundedArray(middle, np.maximum(_round_down(least), 1.0), _round_up(most))
 
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
-        """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
+        """Return the gradient (..., nv) of the manipulability with respect to q.
 
-        The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
-        manipulability is the product of all singular values. The product rule gives the derivative of this
-        product without a division by a singular value. The gradient is NaN if the smallest singular value may
-        be 0. If the smallest singular value is 0, the manipulability may not be differentiable.
+        The derivative of a singular value is u^T J' v, with its singular vectors. The gradient is NaN if the
+        smallest singular value may be 0. There may be no derivative at such configurations.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -214,10 +213,9 @@ def singular_values(
     rows: slice = slice(None),
     columns: FrameJacobian | None = None,
 ) -> SingularValues:
-    """Return the singular values of some rows of finite matrices J (..., m, nv), with guaranteed bounds.
+    """Return singular values with guaranteed bounds.
 
-    `error` contains an upper bound on the error of each number of J. `moving` (nv,) is False for columns that
-    are 0 in every configuration.
+    `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are always 0.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -244,14 +242,14 @@ def singular_values(
 
 
 def _orthogonality_error(U: FloatArray) -> FloatArray:
-    """Return an upper bound (...) on the Frobenius norm |U^T U - I| for U (..., m, k)."""
+    """Bound the Frobenius norm |U^T U - I|."""
     back = U.swapaxes(-1, -2)
     rounding = (U.shape[-2] + 2) * EPS * (np.abs(back) @ np.abs(U))
     return _norm(np.abs(back @ U - np.eye(U.shape[-1])) + rounding)
 
 
 def _norm(E: FloatArray) -> FloatArray:
-    """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
+    """Bound the Frobenius norm of non-negative matrices."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     # The norm of a matrix with inf is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
@@ -261,7 +259,7 @@ def _norm(E: FloatArray) -> FloatArray:
 
 
 def _product(x: FloatArray) -> FloatArray:
-    """Return the product (...) of k numbers (..., k); intermediate products cannot overflow or underflow."""
+    """Multiply without intermediate overflow or underflow."""
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):
         product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))
@@ -269,13 +267,16 @@ def _product(x: FloatArray) -> FloatArray:
 
 
 def _round_up(x: FloatArray) -> FloatArray:
-    """Return an upper bound on the exact number whose rounded value is `x`."""
+    """Return an upper bound on the exact number."""
     with np.errstate(over="ignore", under="ignore"):
         return np.nextafter(x + np.abs(x) * _RELATIVE_ERROR, np.inf)
 
 
 def _round_down(x: FloatArray) -> FloatArray:
-    """Return a lower bound on the exact number whose rounded value is `x`; for inf, the largest double."""
+    """Return a lower bound on the exact number.
+
+    For inf, the bound is the largest double.
+    """
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _RELATIVE_ERROR, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

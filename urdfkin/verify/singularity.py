@@ -1,15 +1,19 @@
 """Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss of rank.
 
-- Lost direction: a left null vector u of J. The frame cannot move along u, because u^T J v = 0 for every v.
-- Null motion: a right null vector of J, that is, joint velocities that do not move the frame.
-- Minimal dependent set: linearly dependent columns that become independent if any column is removed. The
-  joints of such columns cause the loss of rank.
+| Term | Meaning |
+|---|---|
+| lost direction | left null vector u of J; the frame cannot move along u, because u^T J v = 0 for every v |
+| null motion | right null vector of J, that is, joint velocities that do not move the frame |
+| minimal dependent set | linearly dependent columns that are independent if any column is removed |
 
-The module states a geometric reason, such as parallel axes, only if the columns satisfy the geometric
-condition within the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction
-of the axis. The vector a leads from the frame's origin to a point of the axis. Two joint axes are therefore
-collinear if their columns are equal up to sign. An axis passes through the frame's origin if the linear part
-of the column is 0.
+The joints of a minimal dependent set cause the loss of rank. The module states a geometric reason, such as
+parallel axes, only if the columns satisfy the condition within the error bound of J:
+
+    column of a revolute joint: [a x z; z]
+    z: direction of the axis
+    a: vector from the frame's origin to a point of the axis
+    collinear axes: equal columns up to sign
+    axis through the frame's origin: a x z = 0
 """
 
 from __future__ import annotations
@@ -37,18 +41,17 @@ _NEGLIGIBLE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FrameJacobian:
-    """A robot's Jacobian, with the names of the frame and of the joints.
+    """A robot's Jacobian with names.
+
+    `sample_jacobians` always uses a fixed base. With a moving base, permanently lost directions are unknown.
 
     Attributes:
-        J: (..., 6, nv) Jacobian at the frame's origin in world axes.
-        error: (..., 6, nv) bound on the error of each number of J.
-        is_revolute: (nv,) For each column, True for a revolute joint and False for a prismatic joint. The
-            value is None if the column does not belong to a single joint axis.
-        active_entries: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
-        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: True if the caller gave the motion of a moving base. `sample_jacobians` uses a fixed
-            base. For a moving base, the directions that are lost at random configurations are therefore
-            unknown.
+        J: (..., 6, nv) Jacobian at the frame's origin, world axes.
+        error: (..., 6, nv) bounds on the errors of J.
+        is_revolute: (nv,) None for planar, floating and mimicked joints.
+        active_entries: (6, nv) False for entries that are always 0.
+        sample_jacobians: Function that returns random Jacobians (n, 6, nv).
+        moving_base: Whether a base motion is given.
     """
 
     J: FloatArray
@@ -73,17 +76,17 @@ def find_revolute_columns(tree: KinematicTree) -> tuple[bool | None, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Singularity(Displayable):
-    """The rank of a Jacobian in one configuration, and the reasons for a loss of rank.
+    """Rank of a Jacobian, and reasons for a loss of rank.
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full_rank: Largest possible rank: the smaller of the numbers of rows and columns.
+        full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
         lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. The
-            array is empty if urdfkin cannot determine them. This happens if the frame cannot move in some
-            directions in any configuration, and these directions depend on q or on a moving base.
-        null_motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
-        reasons: Sentences about the lost directions and the reasons of the loss.
+            array is empty if urdfkin cannot determine the directions. This can happen if the frame never
+            moves in all directions.
+        null_motions: (e, nv) independent joint velocities that do not move the frame.
+        reasons: Sentences about the lost directions and the reasons.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -117,9 +120,9 @@ class Singularity(Displayable):
 def explain_singularity(
     columns: FrameJacobian, sample: tuple[int, ...], rows: slice, lower: FloatArray, upper: FloatArray
 ) -> Singularity:
-    """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
+    """Explain a loss of rank in one configuration.
 
-    `sample` is the index of the configuration. `lower` and `upper` (k,) bound the singular values.
+    `lower` and `upper` (k,) bound the singular values.
     """
     rank, full = int((lower > 0.0).sum()), len(lower)
     if rank == full:
@@ -168,9 +171,10 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _compare_samples(self) -> tuple[int, FloatArray]:
-        """Return the largest rank at random configurations, and a basis of directions.
+        """Compare the Jacobians at random configurations.
 
-        The frame cannot move in any of these directions at any of the random configurations.
+        Returns:
+            The largest rank, and the directions without motion.
         """
         samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
@@ -206,7 +210,7 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _find_dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield each minimal set of linearly dependent columns, as column indices of `self._A`."""
+        """Yield minimal sets of dependent columns."""
         if self._A.shape[1] > _MAX_COLUMNS:
             return
         found: list[set[int]] = []
@@ -221,7 +225,7 @@ class _Explanation:
                     yield one
 
     def _merge_pairs(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Replace overlapping pairs of dependent columns by their union."""
+        """Merge overlapping pairs of dependent columns."""
         joined: list[set[int]] = []
         if self._linear_only:
             return sets
@@ -322,7 +326,7 @@ class _Explanation:
 
 
 def _sparse_basis(rows: FloatArray) -> FloatArray:
-    """Return a basis with many zeros for the space that the rows span."""
+    """Return a sparse basis of the row space."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):

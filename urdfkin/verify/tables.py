@@ -66,19 +66,18 @@ class TableError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """Result of the check of a table. Each number is the largest value over all samples.
+    """Result of a table's check.
+
+    Each number is the largest value over all samples.
+    The keys of both dictionaries are "placement", "jacobian" and "acceleration".
 
     Attributes:
-        metres: Distance between the table's tip and Pinocchio's tip, m.
-        radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
-        units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
-            quantity's scale. The scale is computed from `ErrorScales`; the scale of an angle is 1.
-        bound_ratios: Ratios of difference to bound for "placement", "jacobian" and "acceleration". A ratio
-            above 1 is a disagreement, unless `loss` explains the difference.
-        has_snapping: True if snapping changed the table. In this case, the bound includes the effect of
-            snapping.
-        loss: If very large lengths in the table cause a difference above the bound, `loss` is a text that
-            explains the difference. Otherwise, `loss` is None.
+        metres: Distance between the tips, m.
+        radians: Angle between the orientations, rad.
+        units: Differences in units of eps * scale. The scale of an angle is 1.
+        bound_ratios: Ratios of difference to bound.
+        has_snapping: Whether the bound includes snapping.
+        loss: Why very large lengths cause a difference, or None.
     """
 
     samples: int
@@ -142,12 +141,12 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 
 def table_length(table: DHTable) -> float:
-    """Return the sum of all lengths in a table, with base and tool, m."""
+    """Return the sum of all lengths, with base and tool."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
 def _describe_loss(table: DHTable) -> str:
-    """Return a text that names the longest length in the table, its rounding error and a remedy."""
+    """Describe the longest length's rounding error."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -199,7 +198,13 @@ def _max_ratio(found: FloatArray, unit: FloatArray | float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class RelativeMotion:
-    """Placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) of a tip relative to a base."""
+    """Motion of a tip relative to a base.
+
+    Attributes:
+        placement: (n, 4, 4).
+        jacobian: (n, 6, nv).
+        acceleration: (n, 6).
+    """
 
     placement: FloatArray
     jacobian: FloatArray
@@ -235,17 +240,16 @@ def compute_relative_motion(
 
 @dataclass(frozen=True, slots=True)
 class ErrorScales:
-    """Lengths and velocities to which the bounds on rounding errors are proportional.
+    """Factors in the bounds on rounding errors.
 
     Attributes:
-        reach: (n,) sum of two path lengths, m: from the root to the table's base, and from the root to the
-            table's tip. Large lengths in the table increase `reach`, as the module's docstring describes.
-        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
-            The sum includes only the joints on the paths from the root to the table's base and tip.
-        sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.
-        rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
-        rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly
-            parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
+        reach: (n,) reach, m; see the module's docstring.
+        turning: (columns,) sum of |multiplier| over revolute joints on both paths.
+        sliding: (columns,) sum of |multiplier| over prismatic joints on both paths.
+        rates: (n,) sum of all |v|.
+        accelerations: (n,) sum of all |a|.
+        rounding: (n,) relative error. The bound includes angles between axes that the table treats as
+            parallel.
     """
 
     reach: FloatArray
@@ -293,11 +297,13 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
 
 
 class _SnapEffect:
-    """Bounds on the changes of a table's quantities by snapping, which rounds the table's angles.
+    """Bounds on the effect of snapping.
 
-    Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
-    vector z x d therefore changes by at most turn * reach + 2 * metres. A product of two such vectors changes
-    by at most twice this amount. The cross product of two axes changes by at most 2 * turn.
+    turn: largest rotation of an axis
+    metres: largest displacement of a joint origin or the tip
+    z x d: change <= turn * reach + 2 * metres
+    product of two such vectors: change <= twice this amount
+    cross product of two axes: change <= 2 * turn
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: ErrorScales) -> None:
@@ -311,8 +317,5 @@ class _SnapEffect:
 
 
 def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest absolute values in the three linear rows, and in the three angular rows.
-
-    `six` has the shape (n, 6, ...), and both results have the shape (n, ...).
-    """
+    """Return linear and angular maxima."""
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

@@ -54,10 +54,7 @@ _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The result of reading a USD stage in a separate process.
-
-    `urdf` is the stage's tree as a URDF text. `answer` contains all data that the process returned.
-    """
+    """The robot of a USD stage, as plain data."""
 
     urdf: str
     remarks: tuple[UsdRemark, ...]
@@ -72,11 +69,10 @@ def read_usd(
     articulation: str | None = None,
     timeout: float = TIMEOUT,
 ) -> UsdReading:
-    """Read the robot of a USD file in a process with limits on time (s) and memory.
+    """Read a USD robot in a separate process.
 
-    OpenUSD also reads the files to which the stage refers. `variants` contains pairs (variant set, variant).
-    Raises SourceError if the file cannot be read or is too large. Raises InputError if OpenUSD is missing,
-    rejects the file or exceeds a limit, or for an unsupported joint.
+    `variants` contains pairs (variant set, variant).
+    `timeout` is in seconds.
     """
     version()
     path = expand_home(source)
@@ -105,10 +101,7 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
-
-    Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
-    """
+    """Compare a robot with OpenUSD's data."""
     joints = reading.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
@@ -120,15 +113,22 @@ def check_usd_source(verifier: Verifier, reading: UsdReading) -> tuple[str, tupl
 
 
 def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare urdfkin's and OpenUSD's data of a joint; return the largest ratio of a difference to its bound.
+    """Compare a joint with OpenUSD's data.
 
-    Let u = `SINGLE_ROUNDOFF` be the relative error of one rounding to single precision.
+    Returns:
+        Largest ratio of difference to bound.
 
-    - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
-      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
-      is twice this length, 16 u. The sum of both angle errors is 18 u, so `_ROTATION_ROUNDINGS` is 18.
-    - Origin: the scale factor, the scaled origin and the transformed origin have one rounding error each.
-      `_ORIGIN_ROUNDINGS` is therefore 3.
+    Bounds, with u = `SINGLE_ROUNDOFF`, the relative error of one rounding to single precision:
+
+        rounded quaternion: angle error <= 2 u
+        product of two quaternions: error <= 4 u in each number
+        vector of the four errors: length 8 u
+        angle error: twice this length, 16 u
+        sum of both angle errors: 18 u
+        `_ROTATION_ROUNDINGS` = 18
+
+        scale factor, scaled origin, transformed origin: one rounding each
+        `_ORIGIN_ROUNDINGS` = 3
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -160,7 +160,10 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _angle(R: FloatArray) -> float:
-    """Return the angle (rad) of a rotation, with full accuracy for small angles."""
+    """Return a rotation's angle, rad.
+
+    Small angles keep full accuracy.
+    """
     sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
@@ -172,14 +175,12 @@ SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SinglePrecisionErrors:
-    """Bounds on the errors that rounding to single precision causes in a robot's links and joints.
+    """Bounds on errors of rounding to single precision.
 
     Attributes:
-        links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
-            configurations.
-        joints: (joints, 3) errors of each joint in the zero configuration. Columns 0 and 1 are the largest
-            position error (m) and angle error (rad) of the child link's frame relative to the parent link's
-            frame. Column 2 is the relative error of the multiplier and the offset in the joint's mimic rule.
+        links: (links, 2) position error (m), angle error (rad), in all configurations.
+        joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
+            Columns 0 and 1 describe the child link in the parent link, at q = 0.
     """
 
     links: FloatArray
@@ -187,31 +188,38 @@ class SinglePrecisionErrors:
 
 
 def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> SinglePrecisionErrors:
-    """Return bounds on the errors that rounding to single precision causes in links and joints.
+    """Bound the errors of rounding to single precision.
 
-    The error of a stored number is at most half the distance to the next number in single precision; 0 has no
-    error.
+        error of a stored number <= half the distance to the next number in single precision
+        error of 0: none
 
-    | Stored | Error |
-    |---|---|
-    | origin | length of the vector of the three errors |
-    | unit quaternion | angle error: twice the length of the vector of the four errors |
-    | mimic rule m q + c | 2^-24 times the sum of the sizes of m q and c, at the largest q within the limits |
+        | Stored | Error |
+        |---|---|
+        | origin | length of the vector of the three errors |
+        | unit quaternion | angle: twice the length of the vector of the four errors |
+        | mimic rule m q + c | 2^-24 (abs(m q) + abs(c)), at the largest q within the limits |
 
-    An angle error moves each later link by at most the angle times the length of the path to this link.
+        angle error t: moves each later link by <= t times the length of the path to this link
 
-    A stage states the pose A of a joint's frame in one body, and the pose B in the other body. In the zero
-    configuration, the pose of the second body in the first body is A B^-1. Let p be the origin of B. Let w be
-    the sum of the position errors of A and B. Let e be the sum of the angle errors of A and B. The angle
-    error of A B^-1 is at most e, and the position error of A B^-1 is at most w + e |p|.
+    Pose errors of a joint:
 
-    - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
-      the revolute joint. In `single`, the numbers of the revolute joint include the errors of B. The fixed
-      joint therefore has no entry in `single`.
-    - Other joints: the last of the joint's five numbers in `single` is |p|.
-    - Locked prismatic joint: the value q also displaces the child link. |q| is at most the length of the
-      joint's constant offset plus the lengths of the two origins.
-    - Joint without an entry in `single`: no rounding errors.
+        A: pose of the joint's frame in the first body
+        B: pose of the joint's frame in the second body
+        A B^-1: pose of the second body in the first body, at q = 0
+        p: origin of B
+        w: sum of the position errors of A and B
+        e: sum of the angle errors of A and B
+        angle error of A B^-1 <= e
+        position error of A B^-1 <= w + e |p|
+
+    Entries of `single`:
+
+        revolute joint: e |p| = 0; if p is not zero, B is a separate fixed joint after the revolute joint
+            the entry of the revolute joint includes the errors of B; the fixed joint has no entry
+        other joints: the last of the five numbers is |p|
+        locked prismatic joint: q displaces the child link too
+            |q| <= length of the constant offset + lengths of the two origins
+        no entry: no rounding errors
     """
     link_errors, joint_errors = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
@@ -236,20 +244,25 @@ def bound_single_precision_errors(tree: KinematicTree, single: SingleErrors) -> 
 
 
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
-    """Compare the placements of links with the transforms of their prims, in the stage's configuration.
+    """Compare the poses of links and prims.
 
-    The bound assumes that a prim's transform consists of n + 1 operations, where n is the number of joints on
-    the path from the root. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at most
-    `_TRANSFORM_ROUNDINGS` u, the largest of these three values:
+    Bounds, with u = `SINGLE_ROUNDOFF` and n joints on the path from the root:
 
-    - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
-    - Quaternion: the vector of the four errors is at most u long. The component of this vector perpendicular
-      to the quaternion changes the rotation by at most 2 u. The component parallel to the quaternion changes
-      the length of the quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t
-      changes by at most 2 u sin t. The sum is at most 4 u.
-    - Matrix: the nine errors form a vector with a length of at most sqrt(3) u. Normalizing the rows does not
-      increase this length. A rotation by a small angle t changes the nine entries by a vector of the length
-      sqrt(2) t. The angle error is therefore at most sqrt(3/2) u.
+        transform of a prim: n + 1 operations (an assumption)
+        angle error of one operation <= 6 pi u, the largest of three values
+        `_TRANSFORM_ROUNDINGS` = 6 pi
+
+        angles: at most three rotations of at most one turn
+            errors <= 2 pi u each, 6 pi u in all
+        quaternion: vector of the four errors, length <= u
+            component perpendicular to the quaternion: the rotation changes by <= 2 u
+            component parallel to the quaternion: the length changes; UsdGeom does not normalize
+            rotation by the angle t: changes by <= 2 u sin t
+            sum <= 4 u
+        matrix: vector of the nine errors, length <= sqrt(3) u
+            normalizing the rows does not increase this length
+            rotation by a small angle t: the nine entries change by a vector of length sqrt(2) t
+            angle error <= sqrt(3/2) u
     """
     prims: dict[str, str] = answer["prims"]
     rows = unpack_array(answer["rest"])

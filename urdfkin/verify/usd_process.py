@@ -57,7 +57,7 @@ def read_stage(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_joints_twice(read: Usd) -> dict[str, Any]:
-    """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
+    """Read each joint with both readers."""
     pxr = import_openusd()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -74,7 +74,7 @@ def _read_joints_twice(read: Usd) -> dict[str, Any]:
 
 
 def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
-    """Return `UsdJoint.as_list` for a joint that OpenUSD's parser has read."""
+    """Return `UsdJoint.as_list` for OpenUSD's joint."""
     frames = []
     for i in (0, 1):
         p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")
@@ -93,7 +93,7 @@ def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
 
 
 def _degrees_of_freedom(physics: Any, one: Any) -> str:
-    """Return the names of a joint's degrees of freedom, such as `transX` or `rotX`."""
+    """Return names such as "transX rotX"."""
     for kind, word in ((physics.RevoluteJointDesc, "rot"), (physics.PrismaticJointDesc, "trans")):
         if isinstance(one, kind):
             return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"

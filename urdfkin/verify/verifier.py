@@ -69,12 +69,16 @@ class NotVerifiedWarning(UserWarning):
 
 
 class Verifier:
-    """Checks the results of one robot and records them.
+    """Checks and records the results of a robot.
 
-    `known_refusal` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the
-    library that checks the results of the robot's methods. Pinocchio always checks tables, the accuracy study
-    and enclosures, even if `oracle` is another library. `source_notes` is a text about the conversion of
-    another format to URDF and the check of this conversion. For a URDF, the text is empty.
+    Pinocchio always checks tables, the accuracy study and enclosures.
+
+    Args:
+        unverifiable: Why Pinocchio cannot check the robot.
+        oracle: Library that checks the methods' results.
+
+    Attributes:
+        source_notes: Text about the conversion to URDF.
     """
 
     def __init__(
@@ -100,9 +104,9 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle for the robot.
+        """Return the oracle of the robot.
 
-        The first call builds the oracle's model. If `base` is not None, the model contains a free-flyer.
+        With `base`, the model has a free-flyer.
         """
         key = library.name, base is not None
         if key not in self._oracles:
@@ -117,7 +121,6 @@ class Verifier:
         return self._oracles[key]
 
     def make_pinocchio_model(self, *, mimic: bool) -> Any:
-        """Return a new `pinocchio.Model`; raise OracleError if Pinocchio cannot check the robot."""
         if self.known_refusal is not None:
             raise OracleError(self.known_refusal, where=self.tree.name)
         return build_model(
@@ -145,7 +148,7 @@ class Verifier:
         return verifier
 
     def find_refusal(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> str | None:
-        """Return the reason why an oracle cannot check this robot; None: the oracle can check the robot."""
+        """Return why an oracle cannot check the robot."""
         if library is PINOCCHIO and self.known_refusal is not None:
             return self.known_refusal
         if library.name not in self._refusals:
@@ -161,7 +164,6 @@ class Verifier:
         return as_verify(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
-        """Raise InstallationError if a check of the call needs Pinocchio, and Pinocchio is missing."""
         if (
             self.resolve_policy(verify) is not False
             and self.known_refusal is None
@@ -180,7 +182,7 @@ class Verifier:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the MJCF or USD file, or of the URDF text as UTF-8."""
+        """SHA-256 of the file, or of the URDF text."""
         # The import is slow, because hashlib loads OpenSSL.
         import hashlib
 
@@ -189,7 +191,7 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check and record the results of a call; raise VerificationError if a difference is too large."""
+        """Check and record the results of a call."""
         ledger, policy = self.ledger, self.resolve_policy(verify)
         if policy is False:
             ledger.count_unchecked(quantity.name, call.result_count)
@@ -221,11 +223,11 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that computes, checks and records a quantity for one configuration.
+        """Add a check to a compiled function.
 
-        The returned function has the same arguments as `compute`. The last argument is `out`. If `compute`
-        does not support the arguments, `compute` and the returned function return None. If the oracle cannot
-        check the robot, the returned function always returns None.
+        The last argument is `out`.
+        The result None means that `compute` does not support the arguments.
+        If the oracle cannot check the robot, the result is always None.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -258,11 +260,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Return the comparison with the oracle's results, and a VerificationError or None.
-
-        If no difference exceeds its bound, the second result is None. Raises RangeError if a number leaves
-        the range of doubles.
-        """
+        """Compare a part of a call with the oracle."""
         x = call.select(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -307,9 +305,9 @@ class Verifier:
     # -- tables --------------------------------------------------------------------------------------
 
     def check_table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
-        """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
+        """Check a Denavit-Hartenberg table.
 
-        Raises TableError if a difference exceeds the bound.
+        None means that Pinocchio cannot check the robot.
         """
         from urdfkin.verify.tables import TableError, check_table
 
@@ -331,9 +329,9 @@ class Verifier:
         return check
 
     def check_tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare Khalil-Kleinfinger parameters with Pinocchio's placements of the links; return a text.
+        """Check Khalil-Kleinfinger parameters with Pinocchio.
 
-        The result is None, with a warning, if Pinocchio cannot check the robot.
+        None means that Pinocchio cannot check the robot.
         """
         from urdfkin.verify.tables import TableError
 
@@ -401,10 +399,9 @@ def compute_oracle_results_with_bound(
 
 
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound on the difference between urdfkin's results and the oracle's.
+    """Bound the differences between urdfkin and an oracle.
 
-    The bound of a placement or a Jacobian depends on the lengths of paths. If the base is fixed and all
-    joints on the paths are revolute, the lengths and the bound are the same in every configuration.
+    A path of revolute joints has a constant length.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0
@@ -434,7 +431,10 @@ def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Flo
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield an oracle's results in blocks of configurations; each block may overwrite the previous block."""
+    """Yield an oracle's results in blocks.
+
+    Each block may overwrite the previous block.
+    """
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 
@@ -452,11 +452,10 @@ def as_verify(verify: object) -> Verify:
 
 
 def split_into_parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of the checked configurations in parts.
+    """Yield the indices of checked configurations in parts.
 
-    `numbers` is the number of values in the results of one configuration.
-
-    The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
+    The sample is random, because a regular sample may be biased.
+    `numbers` is the number of values for one configuration.
     """
     step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

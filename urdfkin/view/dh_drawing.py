@@ -109,7 +109,7 @@ class _Canvas:
                 position = position + step * side
             occupied.append(position)
             look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            # Lines would make the label illegible.
+            # Without this background, lines would make the label illegible.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
             # Labels of x and z axes are formulas, such as $x_1$.
             # Other labels are plain text, because names may contain "$".

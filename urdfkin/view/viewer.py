@@ -38,7 +38,7 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Ranges and velocity limits from this size count as unlimited.
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) from this size count as unlimited.
 _UNLIMITED = 100.0
 #: Step of an angle's slider, degrees or radians.
 _DEGREES, _RADIANS = 1.0, 0.01

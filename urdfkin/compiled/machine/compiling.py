@@ -61,8 +61,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Dynamic globals are memory addresses of this process.
-        # Such code cannot be cached.
+        # Code with memory addresses of this process cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -212,7 +211,7 @@ class Kernel:
 
     def __getattr__(self, name: str) -> Any:
         # This method replaces a `cached_property`.
-        # Before Python 3.12, a fork could leave this lock locked.
+        # Before Python 3.12, a fork could leave the lock of a `cached_property` locked.
         if name != "compiled_function":
             raise AttributeError(name)
         with compile_lock:

@@ -299,7 +299,7 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add `count` squares to `total`.
 
-    The last numbers may count eight times. The total is compared only with a very large bound.
+    The last numbers may be added eight times. The total is compared only with a very large bound.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)

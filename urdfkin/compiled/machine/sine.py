@@ -88,7 +88,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         leading_error = build_fma(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), leading))
         # sin(r + r_error) = sin r + r_error cos r to first order.
         # cos(r + r_error) = cos r - r_error sin r to first order.
-        # The largest term is last, so rounding errors stay small.
+        # The largest term is added last, so rounding errors stay small.
         sine = build_fma(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(r_error, leading))
         sine = builder.fadd(r, sine)
         rest = build_fma(builder, builder.fmul(z, z), polynomial(z, COSINE), leading_error)

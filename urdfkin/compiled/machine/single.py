@@ -231,9 +231,10 @@ def array_layout_is_known() -> bool:
     )
 
 
-#: Kernel for WORLD and LOCAL_WORLD_ALIGNED, and kernel for LOCAL.
-#: Number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
-#: Number of axes of length nv: 1 for a Jacobian, 2 for a Hessian.
+#: Four items for each quantity:
+#: kernel for WORLD and LOCAL_WORLD_ALIGNED, kernel for LOCAL,
+#: number of inputs (1 for q, 2 for q and v, 3 for q, v and a),
+#: number of axes of length nv (1 for a Jacobian, 2 for a Hessian).
 _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),

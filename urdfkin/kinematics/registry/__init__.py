@@ -43,12 +43,11 @@ class Equation:
     """One numbered equation.
 
     Attributes:
-        statement: The equation in urdfkin's notation, in plain characters.
-        definitions: Names of the functions in `urdfkin.kinematics.equations` that contain the equation's
-            formula.
-        functions: Functions that compute the equation, as "module:name".
-        tests: Tests that fail if the equation is computed wrongly, as "file::name".
-        oracle: The independent source with which the tests compare the result.
+        statement: The equation in plain characters.
+        definitions: Functions of `urdfkin.kinematics.equations`.
+        functions: Names such as "module:name".
+        tests: Names such as "file::name".
+        oracle: Independent source of expected results.
     """
 
     number: str
@@ -63,7 +62,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One or more sections of the chapter; `number` is, for example, "7.3" or "7.2.4, 7.2.5"."""
+    """One or more sections of the chapter."""
 
     number: str
     title: str
@@ -72,7 +71,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter; `test` names the proving test, as "file::name"."""
+    """A wrong or incomplete statement in the chapter."""
 
     where: str
     printed: str
@@ -118,7 +117,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
 
 
 def equations_page() -> str:
-    """Return the text of the page docs/equations.md."""
+    """Return the text of docs/equations.md."""
     parts = [_head()]
     for section in sections():
         head = "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
@@ -179,7 +178,10 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page of text about "7.130", "(7.130)" or "eq. 7.130"; None for other text."""
+    """Return the text about an equation.
+
+    `number` is, for example, "7.130" or "(7.130)"; other text gives None.
+    """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST_EQUATION:
         return None

@@ -59,14 +59,13 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """The rule that converts a joint's value to another program's value: `factor * value + zero`.
+    """Rule for joint values of another program.
 
-    The property `factor` includes the sign.
+    The other value is factor * value + zero.
 
     Attributes:
-        unit: Unit of the other program's value: "rad", "deg", "turn", "m" or "mm". A number defines another
-            unit of angles: the number of units in one full turn, for example 4096 for an encoder. None
-            selects the convention's unit; `factor` is then None.
+        unit: "rad", "deg", "turn", "m", "mm" or units per turn.
+            None selects the convention's unit.
     """
 
     name: str | None = None
@@ -89,10 +88,9 @@ class JointRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Convention:
-    """The layout of q, v, a, Jacobians and six-vectors in another program.
+    """The layout of vectors in another program.
 
-    The default values of the attributes are urdfkin's own convention. `conventions.toml` explains each
-    attribute.
+    The defaults are urdfkin's convention. `conventions.toml` explains each attribute.
     """
 
     name: str
@@ -139,7 +137,6 @@ BUILT_IN = (
 
 
 def find_convention(name: str | Path | Convention) -> Convention:
-    """Return a convention by its name or from a TOML file; an unknown name raises UnknownNameError."""
     if isinstance(name, Convention):
         return name
     if not isinstance(name, str | Path):
@@ -156,7 +153,10 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def parse_convention(text: str, where: str, name: str) -> Convention:
-    """Parse the TOML text of a convention; `name` is the convention's name if the text contains none."""
+    """Parse a convention's TOML text.
+
+    `name` is the default name.
+    """
     try:
         entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -255,9 +255,9 @@ def as_toml(convention: Convention) -> str:
 
 
 def _quote(text: str) -> str:
-    """Return a text as a quoted TOML string, with the escapes of JSON.
+    """Quote a text for TOML.
 
-    TOML also requires an escape for the character DEL.
+    TOML also requires an escape for DEL.
     """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
@@ -274,7 +274,7 @@ _THRESHOLD = 31
 
 
 def spell_name(name: str, style: str) -> str:
-    """Return a name as another program writes it; `style` is a value of `Convention.names`.
+    """Return a name as another program writes it.
 
     >>> [spell_name("1", style) for style in ("urdf", "usd", "identifier", "isaacsim")]
     ['1', 'tn__1_', '_', 'a_1']
@@ -291,7 +291,7 @@ def spell_name(name: str, style: str) -> str:
 
 
 def spellings(name: str) -> frozenset[str]:
-    """Return a name as programs write it in USD, and the name itself.
+    """Return all spellings of a name.
 
     >>> sorted(spellings("arm-2"))
     ['arm-2', 'arm_2', 'tn__arm2_g6']
@@ -300,7 +300,7 @@ def spellings(name: str) -> frozenset[str]:
 
 
 def make_identifier(name: str) -> str:
-    """Return a name as OpenUSD's `TfMakeValidIdentifier` does: each byte that is not allowed becomes "_".
+    """Replace invalid bytes like OpenUSD's `TfMakeValidIdentifier`.
 
     >>> make_identifier("1"), make_identifier("arm-2")
     ('_', 'arm_2')
@@ -310,17 +310,18 @@ def make_identifier(name: str) -> str:
 
 
 def transcode(name: str) -> str:
-    """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
+    """Transcode a name like `usdex.core.getValidPrimName` of OpenUSD Exchange.
 
-    The result begins with "tn__" and the name's letters, digits and underscores (ASCII). The character "_"
-    follows if the name contains such characters. Each of the other characters becomes a number in base 62.
-    These numbers are at the end of the result, in the order of the code points. An identifier is returned
-    unchanged.
+    An identifier is returned unchanged.
 
-    As in Punycode, the number is d n + p. The difference d is the character's code point minus the code point
-    of the previous character. p is the character's position among the characters that are already encoded. n
-    is the number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
-    proposals/transcoding_invalid_identifiers.
+        result:   "tn__" + letters, digits, "_" (ASCII) + "_" if there are any + numbers
+        numbers:  d n + p in base 62, as in Punycode, in the order of the code points
+
+        d:   code point minus the previous code point
+        n:   number of possible positions
+        p:   position among the characters that are already encoded
+
+    Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcode("1"), transcode("arm-2"), transcode("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

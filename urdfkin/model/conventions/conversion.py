@@ -32,11 +32,10 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """One number of the target program's q or v: `factor * x[index] + zero`, where x is urdfkin's q or v.
+    """A number of the target program's q or v.
 
-    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `is_mimic` is true if the
-    number is the value or velocity of a mimic joint. The q and v of urdfkin contain no number for a mimic
-    joint.
+    The number is factor * x[index] + zero, where x is urdfkin's q or v.
+    `part` is "cos", "sin" or "".
     """
 
     name: str
@@ -50,12 +49,13 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint whose velocity is defined differently in the target program.
+    """A joint with another velocity definition.
 
-    The target program uses other axes than urdfkin for the velocity, or the linear velocity of another point.
-    This point is `point` (3,), with coordinates in the joint's frame. `q` is the index of the joint's first
-    coordinate in urdfkin's q. `v` is the index of the joint's first velocity in urdfkin's v. `rows` are the
-    joint's indices in the target program's v.
+    Attributes:
+        q: First index in urdfkin's q.
+        v: First index in urdfkin's v.
+        rows: Indices in the target's v.
+        point: (3,) point of the velocity, in the joint's frame.
     """
 
     joint: Joint
@@ -66,15 +66,17 @@ class _FreeJoint:
 
 
 class Conversion:
-    """Names and conversions of one robot in a convention; `robot.convention("mujoco")` returns them.
+    """Names and conversions of one robot in a convention.
 
     Args:
         tree: The robot.
-        urdf: The URDF text, from which some conventions take the order of the joints or the centres of mass.
+        urdf: The URDF text.
         convention: The convention.
-        joints: Order of the joints, instead of the convention's order; required if the convention has none.
+        joints: Order of the joints; required if the convention has none.
 
-    A wrong order, or two columns with the same name, raises InputError; an unknown joint UnknownNameError.
+    Raises:
+        InputError: The order is wrong, or two columns have the same name.
+        UnknownNameError: A joint is unknown.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -149,10 +151,6 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _determines_coordinate(self, i: int) -> bool:
-        """Return whether urdfkin can compute a coordinate from the value of joint i.
-
-        A mimic joint with the multiplier 0 does not determine the mimicked joint's coordinate.
-        """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -186,9 +184,9 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Return the joints breadth first; siblings are in the order of their keys.
+        """Sort the joints breadth first.
 
-        If `merged` is true, two links count as one link if a fixed joint connects them.
+        If `merged` is true, a fixed joint merges two links.
         """
 
         def below(link: int) -> list[int]:
@@ -287,7 +285,11 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) in the link's frame, from the URDF text."""
+        """Read a link's centre of mass.
+
+        Returns:
+            (3,) in the link's frame, m.
+        """
         for element in parse_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -312,21 +314,21 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether the target program's q contains the cosine and the sine of an angle."""
+        """Whether the target program's q contains cosines and sines."""
         return any(column.part for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Name of each number of q in the target program."""
+        """Name of each number of the target program's q."""
         return tuple(column.name for column in self._columns)
 
     @property
     def velocity_names(self) -> tuple[str, ...]:
-        """The target program's name of each element of v, and of each column of the Jacobian."""
+        """Names of the target program's v and Jacobian columns."""
         return tuple(rate.name for rate in self._rates)
 
     def layout(self, symbol: str) -> CoordinateLayout:
-        """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
+        """Return names and units of the target program's "q", "v" or "a"."""
         if symbol != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
@@ -340,18 +342,15 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Index array with which `q[..., permutation]` is the target program's q.
+        """Indices with which `q[..., permutation]` is the target program's q.
 
-        None if the conversion also changes values, for example radians to degrees.
+        None if the conversion also changes values.
         """
         return self._q_index.copy() if self._plain_q else None
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is the same in every configuration.
-
-        The matrix of a floating joint is constant if only the point of the linear velocity differs.
-        """
+        """Whether `matrix` is independent of q."""
         how = self.convention
         return not any(
             block.joint.kind is JointKind.PLANAR or "parent" in (how.linear, how.angular)
@@ -360,15 +359,15 @@ class Conversion:
 
     @property
     def velocity_permutation(self) -> NDArray[np.intp] | None:
-        """Index array with which `v[..., velocity_permutation]` is the target program's v.
+        """Indices with which `v[..., velocity_permutation]` is the target program's v.
 
-        None if the conversion also changes values, for example radians to degrees.
+        None if the conversion also changes values.
         """
         return self._v_index.copy() if self._plain_v else None
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """Indices of each joint in the target program's q and v, by the joint's name in the URDF."""
+        """Indices in the target program's q and v, by joint name."""
         names = [self.tree.joints[i].name for i in self._order]
         indices, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -389,11 +388,12 @@ class Conversion:
     def to(
         self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
+        """Convert q, v and a to the target program's convention.
 
-        The conversion of `v` may depend on `q`. The conversion of the joint accelerations `a` may depend on
-        `q` and `v`. If q is equal in both conventions, the result can be the array q itself. A wrong length
-        or a number that is not finite raises InputError.
+        If q is equal in both conventions, the result can be the array q.
+
+        Raises:
+            InputError: A length is wrong, or a number is not finite.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -417,11 +417,11 @@ class Conversion:
     def from_(
         self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's; inverse of `to`.
+        """Convert q, v and a from the target program's convention.
 
-        A wrong length or a number that is not finite raises InputError. A mimic joint's value that does not
-        follow the mimic rule raises InputError. A (cos, sin) pair whose norm is not 1 within 1e-6 raises
-        InputError.
+        Raises:
+            InputError: A length is wrong, or a number is not finite. A value contradicts a mimic rule.
+                The norm of a (cos, sin) pair is not 1 within 1e-6.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -503,7 +503,7 @@ class Conversion:
         return q
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M x or, if v is given, M x + (dM/dt) v, with M = `matrix(q)`."""
+        """Return M x + M' v, or M x without v."""
         if self._same_v:
             return x
         rates: FloatArray = x[..., self._v_index]
@@ -520,7 +520,7 @@ class Conversion:
         return rates
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M^-1 x or, if v is given, M^-1 (x - (dM/dt) v), with M = `matrix(q)`."""
+        """Return M^-1 (x - M' v), or M^-1 x without v."""
         if self._same_v:
             return x
         rates: FloatArray = x[..., self._v_source]
@@ -538,9 +538,13 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the matrix M (..., program's nv, nv) with v_tool = M v.
+        """Return the matrix M with v_tool = M v.
 
-        If M depends on q, a call without q raises InputError.
+        Returns:
+            (..., program's nv, nv) matrix.
+
+        Raises:
+            InputError: M depends on q, and q is None.
         """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
@@ -559,7 +563,11 @@ class Conversion:
         return M
 
     def matrix_rate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
-        """Return M' (..., program's nv, nv), the time derivative of `matrix`."""
+        """Return M', the time derivative of `matrix`.
+
+        Returns:
+            (..., program's nv, nv) matrix.
+        """
         configurations, velocities = self._parse_inputs(q, v, None)
         shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
         M_rate = np.zeros((*shape, self.nv, self.tree.nv))
@@ -569,11 +577,12 @@ class Conversion:
         return M_rate
 
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
+        """Return M^-1 with v = M^-1 v_tool.
 
-        Several numbers of v_tool may depend on one number of v. For example, v_tool may contain the
-        velocities of a joint and of its mimic joints. M^-1 uses only one of these numbers. The columns of
-        M^-1 for the other numbers are 0.
+        The columns of redundant numbers, such as velocities of mimic joints, are 0.
+
+        Returns:
+            (..., nv, program's nv) matrix.
         """
         if not self._blocks:
             M_inverse = np.zeros((self.tree.nv, self.nv))
@@ -585,9 +594,9 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the block (..., k, k) of `matrix` that belongs to a planar or floating joint.
+        """Return a joint's block of `matrix`.
 
-        If the joint's velocity v is given, the result is the time derivative of the block.
+        If v is given, return the block's time derivative.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -616,7 +625,7 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def reorder_six_vector(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Exchange linear and angular parts of six-vectors if the target program has the angular part first.
+        """Convert six-vectors to the target program's order.
 
         A second call restores the original order.
 
@@ -631,15 +640,20 @@ class Conversion:
         return np.take(array, _ANGULAR_FIRST, axis) if self.angular_first else array
 
     def jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1."""
+        """Convert a Jacobian J (..., 6, nv) to S J M^-1."""
         return self.columns(q, self.reorder_six_vector(J, -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix J (..., rows, nv) to the columns of the target program: J M^-1.
+        """Convert the columns of a matrix to J M^-1.
 
-        The rows do not change, so each row must have the same meaning in both conventions. An example is the
-        derivative of an Euler angle. If the target program has additional columns for mimic joints,
-        InputError is raised.
+        Each row must have the same meaning in both conventions.
+
+        Args:
+            q: Configuration.
+            J: (..., rows, nv) matrix.
+
+        Raises:
+            InputError: The target program has additional columns for mimic joints.
         """
         self._check_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -648,10 +662,13 @@ class Conversion:
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian J (..., 6, program's nv) of the target program to urdfkin's convention: S J M.
+        """Convert a Jacobian of the target program to S J M.
 
-        The result has the shape (..., 6, nv). The column of a mimic joint is added to the mimicked joint's
-        column.
+        The column of a mimic joint is added to the mimicked joint's column.
+
+        Args:
+            q: Configuration.
+            J: (..., 6, program's nv) Jacobian.
         """
         array = self.reorder_six_vector(J, -2)
         return array @ _add_frame_axis(self.matrix(q), array.ndim)
@@ -659,7 +676,7 @@ class Conversion:
     def jacobian_rate(
         self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
     ) -> FloatArray:
-        """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
+        """Convert a Jacobian's rate J' to S (J' M^-1 + J (M^-1)')."""
         converted = self.jacobian(q, rate)
         if self.is_constant:
             return converted
@@ -669,9 +686,12 @@ class Conversion:
         return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert a kinematic Hessian H (..., 6, nv, nv) to the target program's rows and columns.
+        """Convert a kinematic Hessian to the target program.
 
-        H contains the derivatives of the Jacobian J (..., 6, nv) with respect to the joint coordinates.
+        Args:
+            q: Configuration.
+            J: (..., 6, nv) Jacobian.
+            H: (..., 6, nv, nv) derivatives of J by the coordinates.
         """
         self._check_columns()
         inverse, tensor, columns = (
@@ -697,11 +717,16 @@ class Conversion:
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
-        """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
+        """Convert a result to the target program's rows and columns.
 
-        `inputs` is q, or q and v, or q, v and a, in urdfkin's convention. The method calls `jacobian`
-        only to convert a Hessian or the time derivative of a Jacobian. A pose ("placement") is returned
-        unchanged. A quantity that no convention defines raises InputError.
+        Args:
+            quantity: For example "velocity".
+            inputs: q, v and a, as needed.
+            result: In urdfkin's convention.
+            jacobian: Called only for rates and Hessians.
+
+        Raises:
+            InputError: No convention defines the quantity.
         """
         if quantity == "placement":
             return result
@@ -735,14 +760,14 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """Formula that computes one program's numbers from another program's: `x[..., index] * factor + zero`."""
+    """The conversion x[..., index] * factor + zero."""
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
     zero: tuple[float, ...]
 
     def code(self, target: str, source: str) -> str:
-        """Return one line of NumPy code that computes the variable `target` from the variable `source`.
+        """Return a line of NumPy code for the conversion.
 
         >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'
@@ -757,9 +782,12 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the `Reordering` that converts "q" or "v" between two conventions; None if none exists.
+    """Return the reordering between two conventions.
 
-    A `Reordering` cannot convert an angle to its cosine and sine, or a velocity to a different frame.
+    A reordering cannot convert angles to cosines, or change a velocity's frame.
+
+    Returns:
+        None if no reordering exists.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -796,10 +824,9 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each number of urdfkin's q or v, return the index of a number of the target program.
+    """Find the source of each number of q or v.
 
-    The target program's number determines urdfkin's number. The numbers of independent joints have priority
-    over the numbers of mimic joints.
+    Mimic joints have the lowest priority.
     """
     return [
         min(
@@ -827,8 +854,5 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Return M in a shape that broadcasts with a Jacobian with `ndim` array axes.
-
-    If M is a batch and the Jacobian contains several frames, the shape is (..., 1, k, l).
-    """
+    """Make M broadcast with several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

@@ -48,12 +48,14 @@ PreviousEdges = tuple[Edge | None, Edge | None]
 
 
 def motion_type(kind: JointKind) -> str:
-    """Return "turns" for a revolute or continuous joint, else the name of the joint's kind."""
     return "turns" if kind.turns else str(kind.value)
 
 
 class JointMatcher:
-    """Find corresponding joints of A and B; `name_map` maps joint names of A to joint names of B."""
+    """Find corresponding joints of two mechanisms.
+
+    `name_map` maps joint names of A to joint names of B.
+    """
 
     def __init__(self, a: Mechanism, b: Mechanism, name_map: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.name_map, self._tolerance = a, b, name_map, tolerance
@@ -77,11 +79,12 @@ class JointMatcher:
     def edges(
         self, bodies: tuple[int, int], via: PreviousEdges, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
-        """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
+        """Pair the joints at two bodies.
 
-        The matcher reached the two bodies through the joints `via`. G (4, 4) moves A's body from its zero
-        configuration to the current pose of B's body. XC (4, 4) moves B's body from its zero configuration to
-        its current pose.
+        `BodyPair` describes the arguments.
+
+        Returns:
+            Joint pairs, unpaired joints of A, and unpaired joints of B.
         """
         named, left_a, left_b = self.pair_by_name(bodies, via)
         pairs = list(named)
@@ -119,7 +122,6 @@ class JointMatcher:
         return known
 
     def has_same_shape(self, bodies: tuple[int, int], via: PreviousEdges) -> bool:
-        """Return whether two subtrees have the same branching and the same kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_by_body[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -130,10 +132,9 @@ class JointMatcher:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis of a body of A coincides with a joint axis of a body of B.
+        """Return whether B has all joint axes of A.
 
-        `bodies` contains the indices of the two bodies. The rigid motion X (4, 4) moves B's axes before the
-        comparison.
+        X (4, 4) moves B.
         """
         return all(
             any(
@@ -148,9 +149,9 @@ class JointMatcher:
     def rank_candidates(
         self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
     ) -> list[Edge]:
-        """Return the joints of B, most similar to `e` first; omit joints that the user matched.
+        """Return the joints of B, most similar first.
 
-        The motion X (4, 4) moves B from its zero configuration to the pose of A.
+        Joints that the user matched are omitted.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -203,7 +204,11 @@ class JointMatcher:
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
-        """Return the angle (rad) and distance (m) between two axes; (0, 0) for different kinds of joints."""
+        """Return the difference of two joint axes.
+
+        Returns:
+            Angle (rad) and distance (m); (0, 0) for different kinds of joints.
+        """
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):
             return 0.0, 0.0
@@ -214,8 +219,6 @@ class JointMatcher:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointGeometry:
-    """A joint's kind and axis, the shape of its subtree, and the origin and z axis of its frame."""
-
     kind: str
     shape: str
     screw: Screw
@@ -247,9 +250,9 @@ Both = tuple[_Some, _Some]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A joint's axis in the zero configuration, and a reference line, usually the previous joint's axis.
+    """A joint's axis in the zero configuration.
 
-    For a prismatic joint, only the direction of `screw` has a meaning.
+    `reference` is usually the previous axis. The axis of a prismatic joint has no position.
     """
 
     screw: Screw
@@ -260,9 +263,10 @@ class Axis:
         return Axis(self.screw.transform(T), self.turns, self.reference.transform(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate u . p (m), where p is the point of the reference line nearest to the axis.
+        """Return where the reference line is nearest to the axis.
 
-        The result is None for a prismatic joint, and for parallel lines.
+        Returns:
+            Coordinate along u (m); None for prismatic joints and parallel lines.
         """
         s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
@@ -274,9 +278,9 @@ class Axis:
 
 
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
-    """Yield values (rad or m) of a joint that may move the axis `axis_b` to the axis `axis_a`.
+    """Yield joint values that may align two axes.
 
-    The axis of this joint is u.
+    The joint has the axis u.
     """
     if not turns:
         heights = axis_a.height(u.direction), axis_b.height(u.direction)
@@ -300,11 +304,7 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield each pair of a joint axis at A's body and a joint axis of the same kind at B's body.
-
-    After a pair whose axis in A is parallel to A's `reference` line, the function continues at the next two
-    bodies.
-    """
+    """Yield pairs of later joint axes."""
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
@@ -315,10 +315,9 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align an axis of B with an axis of A.
+    """Yield poses of B that align two axes.
 
-    The axes of other joints determine the rotation about the aligned axis and the shift along this axis. A
-    rotation or shift that no axis determines is 0.
+    A rotation or shift that no axis determines is 0.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
@@ -337,11 +336,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align joint axes of one body of B with joint axes of one body of A.
-
-    A pose aligns up to three axes. If these axes do not determine the shift along the first axis, the axes of
-    later joints determine the shift.
-    """
+    """Yield poses of B that align axes of one body."""
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
     turning = [i for i, axis in enumerate(axes_a) if axis.turns]
@@ -396,11 +391,9 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Combine each branch of A with each branch of B, and return the first revolute axes of both branches.
+    """Return the first revolute axes of all branch pairs.
 
-    There is one item for each combination. The item contains the first revolute pair, the prismatic pairs
-    before this pair, and the pairs after this pair. If two branches have only prismatic pairs, the item
-    contains the last prismatic pair instead of a revolute pair.
+    Each item also contains the axes before and after.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -449,14 +442,14 @@ VelocityRatios = Mapping[str, tuple[str, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The pose X (4, 4) of B's body after two joints, and the coordinates of the matched subtrees."""
+    """Result of matching two subtrees."""
 
     X: FloatArray
     ratios: VelocityRatios
 
 
 class SubtreeMatcher:
-    """Find subtrees of A and B that match exactly (module docstring)."""
+    """Find subtrees that match exactly."""
 
     def __init__(
         self,
@@ -477,12 +470,15 @@ class SubtreeMatcher:
     def joint_pairs(
         self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
     ) -> Sequence[EdgePair] | None:
-        """Return the joint pairs if the subtrees match exactly after B moves by X (4, 4), else None."""
+        """Return the joint pairs of two equal subtrees.
+
+        X (4, 4) moves B. The result is None if the subtrees differ.
+        """
         found = self._match_bodies(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after joint f if the subtrees match exactly, else None."""
+        """Return the pose of B's body after joint f."""
         found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -547,7 +543,6 @@ class SubtreeMatcher:
         return match
 
     def _velocity_ratio(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> VelocityRatios:
-        """Return the coordinates that move two joints, and the ratio of the coordinates' velocities."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -562,7 +557,10 @@ class SubtreeMatcher:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _merge_ratios(self, some: VelocityRatios, others: VelocityRatios) -> VelocityRatios | None:
-        """Merge two sets of matched coordinates; return None if the sets contradict each other."""
+        """Merge two sets of matched coordinates.
+
+        The result is None if the sets contradict each other.
+        """
         for x in some.keys() & others.keys():
             (y, ratio), (other, other_ratio) = some[x], others[x]
             tolerance = self.tolerance.angle * max(1.0, abs(other_ratio))
@@ -578,9 +576,9 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint leads from the pose X to the pose `other`.
+        """Return whether the joint can move X to `other`.
 
-        For a planar joint, the function only checks whether the two poses are equal.
+        Planar joints need equal poses.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

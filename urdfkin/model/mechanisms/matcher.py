@@ -5,10 +5,14 @@ the matcher chooses the sign (`sense`) and the zero offset. The best choice make
 links and axes of B coincide with links and axes of A. `align` compares the results for several first bodies
 and joint orders.
 
-If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. Let v =
-m w + c be a mimic rule of A, and v' = m' w' + c' the corresponding rule of B. Insert v' = s v + o and w' = s'
-w + o' into the second rule. The two rules are equivalent if the result is the first rule. For a revolute
-joint, a multiple of a full turn may always be added to o.
+If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset:
+
+    mimic rule of A:             v = m w + c
+    corresponding rule of B:     v' = m' w' + c'
+    alignment:                   v' = s v + o,  w' = s' w + o'
+    the rules are equivalent:    m' s' = s m,  m' o' + c' = s c + o
+
+For a revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -71,10 +75,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of later joint pairs that the matcher compares.
+    """A limit on comparisons of later joints.
 
-    The matcher compares later joints if several choices at a joint are equally good. `remaining` is the
-    number of joint pairs that the matcher may still compare. Several matchers can share one limit.
+    Several matchers can share a limit.
     """
 
     remaining: int
@@ -82,13 +85,14 @@ class LookAhead:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPair:
-    """A body of A and the corresponding body of B.
+    """Two corresponding bodies.
+
+    Both motions start at the zero configuration.
 
     Attributes:
-        via: The joint of A and the joint of B through which the matcher reached the bodies; None without a
-            joint.
-        G: (4, 4) motion of A's body from its zero configuration to the current pose of B's body.
-        XC: (4, 4) motion of B's body from its zero configuration to its current pose.
+        via: Joints before the bodies, if any.
+        G: (4, 4) motion of A's body to B's body.
+        XC: (4, 4) motion of B's body.
     """
 
     bodies: tuple[int, int]
@@ -99,14 +103,9 @@ class BodyPair:
 
 
 class MechanismMatcher:
-    """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
+    """Match the joints of two mechanisms.
 
-    Without `choices`, the matcher searches for the pose of B's root and for the signs, zero offsets and
-    conversions of the joints. The search maximizes the number of joints and links that agree. Without `base`,
-    the matcher starts at A's root body. In B, the matcher starts at the body that shares the most link names
-    with A's root body. If no body of B shares a link name with A's root body, the matcher tries all bodies of
-    B. The matcher then also tries B's root body with the body of A that shares the most link names with B's
-    root body, if there is one.
+    Without `choices`, the matcher searches for all values.
     """
 
     def __init__(
@@ -148,10 +147,7 @@ class MechanismMatcher:
         return best
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield the bodies of A and B from which the matcher may start.
-
-        Each pair of bodies comes with a pose (4, 4) of B's root in A's root frame.
-        """
+        """Yield first bodies and root poses."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -179,11 +175,10 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
+        """Return an upper bound on the number of matches.
 
-        If a branch with m joints is matched to a branch with n joints, at most min(m, n) joint pairs match.
-        The same bound holds for the links of the two branches. The sum of the bounds over all branches is
-        largest if the branches are matched in the order of their sizes.
+        Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
+        The sum is largest if the branches are sorted by size.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -281,11 +276,7 @@ class MechanismMatcher:
         return self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: EdgePair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield possible poses of the next body of B.
-
-        The joints `via` connect the current bodies of A and B to the next bodies `beyond`. X is the pose of
-        B's current body.
-        """
+        """Yield possible poses of B's next body."""
         next_pair = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = motion_type(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -320,12 +311,7 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair a link of A and a link of B whose names do not occur in the other model.
-
-        The two links belong to matched bodies, and count as different end-effector frames. The result is None
-        if a link of one body already matches a link of the other body. The result is also None if every link
-        name of one body occurs in the other model.
-        """
+        """Pair two different end-effector frames."""
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -449,12 +435,10 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_after: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
+        """Yield candidates for the rigid motion N.
 
-        `pose_a` (4, 4) is the frame of A's joint after the motion G. `zero_pose_b` (4, 4) is the frame of B's
-        joint in B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane`
-        (4, 4) is one of the possible motions N. Each possible motion N is the product of `plane` and a planar
-        pose.
+        The module `mechanism` defines N.
+        `plane` is one possible N of a planar joint. `pose_a` includes the motion G.
         """
         yield IDENTITY if plane is None else plane
         candidates = [next_pair.XC]
@@ -475,7 +459,6 @@ class MechanismMatcher:
         *,
         turns: bool,
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        """Match two revolute or prismatic joints, and choose the sign and zero offset."""
         e, f = _require_edges(next_pair.via)
         s = _outwards(self.a.screw(e), backwards[0])
         t = _outwards(self.b.screw(f), backwards[1])
@@ -516,7 +499,10 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _zero_choice(self, joint: str) -> tuple[int, float | None]:
-        """Return a joint's prescribed sign and zero offset; (0, None) without `choices`."""
+        """Return the prescribed sign and offset.
+
+        Without `choices`, the result is (0, None).
+        """
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
@@ -532,10 +518,9 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
     ) -> tuple[_Choice, BodyPair, Score]:
-        """Return the choice for which the largest number of links and axes agrees.
+        """Return the best of several choices.
 
-        If several choices are equally good, the method compares later joints. For example, two axes that
-        intersect at right angles allow two poses of B, so a third axis must decide.
+        Perpendicular axes that intersect allow two poses of B, so a third axis decides.
         """
         scored = list[tuple[_Choice, BodyPair, Score]]()
         for choice, body_pair in choices:
@@ -593,7 +578,7 @@ class MechanismMatcher:
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
-    """For each body, return the numbers of bodies and links in its subtree, including the body itself."""
+    """Count bodies and links per subtree."""
     sizes = [(1, len(links)) for links in mechanism.bodies]
     for edge in reversed(mechanism.edges):
         bodies, links = sizes[edge.outer]
@@ -619,7 +604,6 @@ def is_better(score: Score, than: Score) -> bool:
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return a joint's screw, reversed if the matcher crosses the joint from the child to the parent."""
     return screw.reverse() if backwards else screw
 
 
@@ -641,11 +625,10 @@ def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> li
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation (4, 4) that makes the planes of two joints parallel.
+    """Make two planes parallel.
 
-    The second result is the angle (rad) of this rotation. The angle does not depend on the signs of the
-    planes' normals or on the distance between the planes. The third result is the shift, which is always 0 m
-    for planes.
+    Returns:
+        Rotation (4, 4), angle (rad), shift 0.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -667,7 +650,7 @@ MOST_EXCHANGED = 12
 def align(
     a: Mechanism, b: Mechanism, name_map: Mapping[str, str], choices: AlignmentChoices | None = None
 ) -> Alignment:
-    """Align B with A; `name_map` maps joint names of A to joint names of B."""
+    """Align mechanism B with mechanism A."""
     if choices is not None:
         for order in choices.orders:
             b = b.reorder(order)
@@ -701,10 +684,6 @@ def _orders_to_try(
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
-    """Align A and B again, with zero offsets that fit the mimic rules.
-
-    The result is `best` if the new alignment has more differences, or if its largest difference is larger.
-    """
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -721,9 +700,9 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Exchange the partners of two joint pairs if the exchange improves the alignment.
+    """Exchange partners of joint pairs.
 
-    An exchange can be necessary for a robot with mirrored arms.
+    Robots with mirrored arms can need exchanges.
     """
     # A joint without a partner cannot agree.
     if best.only_a or best.only_b:
@@ -743,12 +722,9 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
 
 def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Repeat the alignment with larger tolerances; return the new alignment if it is better than `best`.
+    """Search again with larger tolerances.
 
-    If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
-    A search with larger tolerances can find these choices. Then the function aligns A and B with these
-    choices and the normal tolerance, so that the result contains the small differences. The new alignment is
-    better if its largest difference is less than half of the largest difference of `best`.
+    If all axes differ slightly, no axes agree within the normal tolerance.
     """
     a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
@@ -793,15 +769,18 @@ OFFSET_FACTOR = 1e4
 class _Rule:
     """The mimic rules of two matched joints.
 
-    A's joint has the value m x + c, where x is a coordinate of A. B's joint has the value n y + d, where y is
-    a coordinate of B. In the alignment, the value of B's joint is s (m x + c) + o. The sign s is 1 or -1. The
-    zero offset o is the field `offset`.
+        x, y:             coordinates of A and B
+        A's joint:        m x + c
+        B's joint:        n y + d = s (m x + c) + o
+        s, o:             sign (1 or -1), zero offset
+        alpha, beta:      y = alpha x + beta
 
     Attributes:
-        slope: The product s m.
-        constant: The product s c.
-        free: True if no link and no axis after the joint determines o. In this case, o can have any value.
-        has_effect: True if the joint moves matched links, or the axis of a later joint.
+        slope: s m
+        constant: s c
+        offset: o
+        free: Whether o can have any value.
+        has_effect: Whether matched links or later axes move.
     """
 
     step: int
@@ -815,11 +794,11 @@ class _Rule:
     has_effect: bool
 
     def beta_for(self, turn: int) -> float:
-        """Return the constant beta of y = alpha x + beta after `turn` full turns are added to o."""
+        """Return beta after adding full turns to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def offset_for(self, beta: float) -> float:
-        """Return the joint's zero offset o for a given constant beta in y = alpha x + beta."""
+        """Return o for a given beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
@@ -830,9 +809,9 @@ class _Rule:
 
 
 def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return sign and zero offset of each joint for which the mimic rules determine the zero offset.
+    """Return new zero offsets that fit the mimic rules.
 
-    The keys are the joint names of A.
+    The keys are A's joint names.
     """
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
@@ -881,9 +860,9 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later axes or links determine the zero offset of joint pair i.
+    """Return whether later links or axes determine an offset.
 
-    The second result is the value of `_Rule.has_effect`.
+    Also return `_Rule.has_effect`.
     """
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
@@ -903,7 +882,7 @@ def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
 
 
 def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
-    """Return whether the axis of the second joint stays fixed when the first joint moves."""
+    """Return whether moving `one` keeps the axis of `other`."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:

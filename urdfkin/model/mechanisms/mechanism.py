@@ -28,12 +28,11 @@ displaced, S' differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
-If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all
-joints and links, the two models have the same motion. If A and B differ at a joint or link, the motions of
-the two models usually differ. There are exceptions, for example two consecutive revolute joints whose axes
-are the same line. The poses of the links after such joints depend only on the sum of the two angles.
-Likewise, the poses of the links after two consecutive parallel prismatic joints depend only on the sum of the
-two displacements.
+Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
+S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
+the same motion. If A and B differ at a joint or link, the motions of the two models usually differ. There are
+exceptions, for example two consecutive revolute joints whose axes are the same line. The poses of the links
+after such joints depend only on the sum of the two angles.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
@@ -68,7 +67,7 @@ PARALLEL_TOLERANCE = 1e-12
 
 
 def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
-    """Return exp(S t) (4, 4): a rotation (rad) about the screw S, or a translation (m) along S."""
+    """Return the motion exp(S t)."""
     if not turns:
         return pose(p=screw.direction * value)
     R = rotation_about(screw.direction, value)
@@ -76,11 +75,7 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 
 
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
-
-    The motion contains no rotation about the axis and no shift along the axis, because neither changes the
-    axis. The axis of a prismatic joint has only a direction, so the shift is 0.
-    """
+    """Return the smallest motion, its tilt and its shift."""
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
     if turns:
@@ -90,7 +85,10 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the smallest rotation from one unit vector to another, and its angle."""
+    """Return the smallest rotation and angle.
+
+    The arguments are unit vectors.
+    """
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
@@ -101,7 +99,11 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) between two poses."""
+    """Return the difference of two poses.
+
+    Returns:
+        Angle (rad) and distance (m).
+    """
     R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Python floats are faster than small NumPy arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
@@ -109,13 +111,16 @@ def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def angle_about(u: FloatArray, R: FloatArray) -> float:
-    """Return the angle (rad) for which a rotation about u is nearest to the rotation R."""
+    """Return the angle about u that best approximates R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle (rad) about u from x to y; None if x or y is parallel to u."""
+    """Return the angle about u from x to y.
+
+    The result is None if x or y is parallel to u.
+    """
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < PARALLEL_TOLERANCE:
         return None
@@ -131,13 +136,14 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTransform:
-    """The conversion of a planar or floating joint: P_b = before P_a behind.
+    """Conversion of a planar or floating joint.
 
-    P_a and P_b are the poses that the joint's coordinates describe in A and B. `before` and `behind` are the
-    rigid motions M and N (4, 4) of the module docstring.
+    See *Planar and floating joints* above.
 
-    `back` is true if the joint is reversed in one model: the joint's parent body in A corresponds to the
-    joint's child body in B. If `back` is true, the formula contains the inverse of P_a instead of P_a.
+    Attributes:
+        before: Rigid motion M (4, 4).
+        behind: Rigid motion N (4, 4).
+        back: Whether one model reverses the joint.
     """
 
     before: FloatArray
@@ -145,12 +151,15 @@ class JointTransform:
     back: bool = False
 
     def __call__(self, kind: JointKind, coordinates: FloatArray) -> FloatArray:
-        """Convert coordinates (..., 3 or 7) of A's joint to coordinates of B's joint."""
+        """Convert coordinates from A to B."""
         P = pose_of(kind, coordinates)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid motions, and the joint can reach M P N for two test poses P."""
+        """Return whether the joint allows this conversion.
+
+        The test uses two poses P.
+        """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
@@ -158,7 +167,15 @@ class JointTransform:
 
 
 def pose_of(kind: JointKind, coordinates: FloatArray) -> FloatArray:
-    """Return P (..., 4, 4) for a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
+    """Return the poses of a joint.
+
+    Args:
+        kind: Planar or floating.
+        coordinates: (..., 3) x, y, angle, or (..., 7) x, y, z, qx, qy, qz, qw.
+
+    Returns:
+        (..., 4, 4) poses.
+    """
     P = np.zeros((*coordinates.shape[:-1], 4, 4))
     P[..., 3, 3] = 1.0
     if kind is JointKind.PLANAR:
@@ -186,7 +203,6 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def planar_angle(P: FloatArray) -> FloatArray:
-    """Return the angle of the rotation about z that is nearest to a pose's rotation."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
@@ -195,11 +211,13 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 
 
 def planar_counterpart(M: FloatArray) -> FloatArray:
-    """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
+    """Return a motion N that makes M P N planar.
 
-    M must keep or reverse the plane's normal. If M keeps the normal, M is a motion in the plane and a
-    translation along the normal. If M reverses the normal, M also contains half a turn about the x axis. N
-    contains the opposite translation and the same half turn.
+    M must keep or reverse the normal of the plane.
+
+        normal kept:       (M, N) = (E T, T^-1)
+        normal reversed:   (M, N) = (E T F, F T^-1)
+        E: motion in the plane;  T: translation along the normal;  F: half a turn about x
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -207,7 +225,10 @@ def planar_counterpart(M: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screw:
-    """A joint's axis as a directed line: a unit direction through a point."""
+    """A joint's axis as a directed line.
+
+    `direction` is a unit vector.
+    """
 
     direction: FloatArray
     point: FloatArray
@@ -221,7 +242,7 @@ class Screw:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A joint between the parent body `inner` and the child body `outer`."""
+    """A joint between the bodies `inner` (parent) and `outer` (child)."""
 
     #: Index of the joint in the tree.
     joint: int
@@ -233,17 +254,15 @@ class Edge:
 
 
 class Mechanism:
-    """Bodies and joints of a tree in the zero configuration.
+    """Bodies and joints in the zero configuration.
 
     Args:
-        tree: The robot.
-        separating_joints: Indices of joints that are fixed in this model and move in the other model.
-        labels: A label for each link, by default the link's name. Links with equal labels are paired.
+        separating_joints: Fixed joints that move in the other model.
+        labels: The links' names by default.
 
     Attributes:
-        zero_poses: (4, 4) pose of each link in the root frame, in the zero configuration.
-        orders: One entry for each call of `reorder`, with the names of the reordered joints in the new order.
-        lengths: Length (m) of the path from the root to each link.
+        zero_poses: (4, 4) poses in the root frame.
+        lengths: Path lengths from the root, m.
     """
 
     def __init__(
@@ -280,9 +299,9 @@ class Mechanism:
         return known
 
     def reorder(self, names: Sequence[str]) -> Mechanism:
-        """Return a copy with joints in another order; remove links whose pose depends on the order.
+        """Return a copy in another order.
 
-        `names` lists consecutive joints outwards. The caller must check that the order gives the same motion.
+        `allows_order` must be true. Links whose pose depends on the order are omitted.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -298,7 +317,10 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joints `names` are consecutive and give the same motion in the order `names`."""
+        """Return whether the order keeps the motion.
+
+        The joints must be consecutive.
+        """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         consecutive = all(self._are_consecutive(inner, outer) for inner, outer in pairwise(run))
@@ -317,7 +339,7 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each unbranched sequence of joints, yield all orders that give the same motion.
+        """Yield equivalent joint orders for each unbranched run.
 
         The current order comes first.
         """
@@ -341,8 +363,8 @@ class Mechanism:
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
         """Return whether two joints commute.
 
-        Two prismatic joints always commute. Two revolute joints commute if their axes are the same line. A
-        prismatic joint and a revolute joint commute if their axes are parallel.
+        Two prismatic joints always commute. Two revolute joints need equal axes.
+        A revolute and a prismatic joint need parallel axes.
         """
         kinds = [self.joint(edge).kind for edge in (one, other)]
         if not all(kind.has_axis and kind.nv for kind in kinds):
@@ -362,18 +384,17 @@ class Mechanism:
 
     @cached_property
     def size(self) -> float:
-        """Length (m) of the longest path from the root to a link."""
+        """Length (m) of the longest path from the root."""
         return max(self.lengths)
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error (rad) of the links' rotations in a robot that was read from a file.
+        """Rounding error (rad) of the links' rotations.
 
-        This error times `size` is the rounding error (m) of the links' positions. The program that wrote the
-        file rounded each joint's constant transform and axis, and the parser rounds these numbers again. A
-        program that merges fixed joints rounds less often, because the program rounds only the product of the
-        joints' transforms. The error includes the angles `Joint.tilt` between Pinocchio's joint axes and the
-        URDF's joint axes.
+        The error of positions is this error times `size`.
+        The program that wrote the file rounded each joint's constant transform and axis.
+        The parser rounds these numbers again. A program that merges fixed joints rounds less often.
+        The error includes the tilt between Pinocchio's and the URDF's axes.
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
@@ -383,7 +404,7 @@ class Mechanism:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """The largest angle (rad) and the largest distance (m) that rounding errors can explain."""
+    """The largest angle (rad) and distance (m) from rounding."""
 
     angle: float
     distance: float
@@ -393,20 +414,23 @@ class Tolerance:
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
-    """Return the largest angle and distance that rounding can cause between two models of the same robot."""
+    """Return the tolerance for rounding errors."""
     k = a.rounding + b.rounding
     return Tolerance(k, k * size_of(a, b))
 
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
-    """Return the length (m) by which comparisons multiply an angle to obtain a distance."""
+    """Return the length that converts angles to distances."""
     return max(a.size, b.size, MIN_ROBOT_SIZE)
 
 
 def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, float]:
-    """Return the angle (rad) between two axes, and the distance (m) from `s.point` to the line `t`.
+    """Return the difference of two axes.
 
-    Axes with opposite directions count as parallel. If `with_distance` is false, the distance is 0.
+    Opposite directions count as parallel.
+
+    Returns:
+        Angle (rad), and distance (m) of `s.point` from `t`.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -425,28 +449,23 @@ IDENTITY.setflags(write=False)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedJoints:
-    """A joint of A and the matched joint of B, with their indices in the two trees.
+    """Two matched joints.
+
+    The value of B's joint is sense * (value of A's joint) + offset.
 
     Attributes:
-        kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
-        previous: Index of the previous joint pair on the path from the base; -1 for the first pair.
-        sense: +1 or -1, the factor in the formula of `offset`.
-        offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
-        before: (4, 4) constant rigid motion L before B's joint; the module docstring defines L. L is
-            expressed in A's root frame, with A in the zero configuration.
-        axis_a: Screw S of A's joint in the zero configuration. Of the joint's two bodies, exp(S t) moves the
-            body that is farther from the base. If A's joint is fixed, `axis_a` is the screw of B's joint.
-        axis_b: Screw S' of B's joint; the module docstring defines S'. S' has the positive direction of
-            `axis_a`. `axis_b` differs from `axis_a` if B's joint axis is displaced and B's later bodies are
-            not displaced. In all other cases, `axis_b` is equal to `axis_a`.
-        tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
-        shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
-        kind_difference: "a" if only A's joint is fixed, and "b" if only B's joint is fixed. "kind" if both
-            joints move and have different kinds of motion. One of the two models may exchange the parent and
-            the child of a planar or floating joint. For such a joint, the value is "kind" if the given
-            `AlignmentChoices` contain no conversion for the joint. An empty string in all other cases.
-        conversion: Converts coordinates of a planar or floating joint of A to coordinates of B's joint. None
-            if the coordinates are equal.
+        kind: "turns", "prismatic", "planar" or "floating".
+        previous: Previous joint pair, or -1.
+        offset: Zero offset, rad or m.
+        before: Rigid motion L (4, 4).
+        axis_a: Screw S; exp(S t) moves the body farther from the base.
+            If A's joint is fixed, this is B's screw.
+        axis_b: Screw S'. If S' = S, this is the object `axis_a`.
+        tilt: Angle between axes or normals, rad.
+        shift: Distance between axes or origins, m.
+        kind_difference: "a" or "b" if only the joint of this model is fixed.
+            "kind" for different kinds, and for reversed joints without `conversion`. Otherwise "".
+        conversion: None for equal coordinates.
     """
 
     a: int
@@ -470,17 +489,15 @@ class MatchedJoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePair:
-    """A link of A and the matched link of B, with their indices in the two trees.
+    """Two matched links.
 
     Attributes:
-        previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
-        zero_pose: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) constant rigid motion L after the last joint on the path to B's link; the module docstring
-            defines L. L is expressed in A's root frame, with A in the zero configuration.
-        tilt: Angle (rad) between the frames of the two links.
-        shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in the frame of A's link, for two links that are different end-effector
-            frames. For all other pairs of links, `tool` is the identity.
+        previous: Last joint pair, or -1.
+        zero_pose: (4, 4) pose of A's link.
+        end: Rigid motion L (4, 4).
+        tilt: Angle between the frames, rad.
+        shift: Distance between the origins, m.
+        tool: (4, 4) pose of B's link in A's link; usually the identity.
     """
 
     a: int
@@ -493,10 +510,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy that treats the two links as different end-effector frames.
-
-        In the copy, `tool` is the pose of B's link in the frame of A's link. `tilt` and `shift` are 0.
-        """
+        """Return a copy with the difference in `tool`."""
         tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -510,12 +524,11 @@ class Alignment:
     """The result of aligning two mechanisms.
 
     Attributes:
-        base: The link of A and the link of B at which the search for matching joints started.
-        X: (4, 4) pose of B's root in A's root frame.
-        steps: The joint pairs, ordered outwards from the base.
-        match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest difference (m) of a joint pair or link pair. The difference of a pair is
-            `tilt` times `size_of`, plus `shift`.
+        base: Links where the search started.
+        X: (4, 4) pose of B's root in A's root.
+        steps: Joint pairs, outwards from the base.
+        match_count: Number of pairs that agree.
+        max_difference: Largest value of tilt * size_of + shift, m.
     """
 
     a: Mechanism
@@ -531,7 +544,7 @@ class Alignment:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all joints of A and B are matched, and all matched joints and links agree."""
+        """Whether all joints match without differences."""
         alike = not any(step.kind_difference for step in self.steps)
         return alike and not (self.max_difference or self.only_a or self.only_b)
 
@@ -547,10 +560,9 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """The smallest and the largest difference (m) among the joint pairs and link pairs that differ.
+        """Smallest and largest difference (m) of the pairs.
 
-        The difference of a pair is `tilt` times `size_of`, plus `shift`. If no pair differs, both values are
-        0. A pair of links is ignored if neither link has a child joint.
+        Both are 0 without differences. Pairs of links without child joints are ignored.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -575,11 +587,7 @@ class Alignment:
         )
 
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
-
-        The names of a and c occur neither in B nor in `name_map`. For each of the two joint pairs, the two
-        joints differ, or later joints or links of A and B differ.
-        """
+        """Yield joint pairs with exchangeable partners."""
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
@@ -590,9 +598,9 @@ class Alignment:
                 yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Return a `FramePair` for each pair (a, b) of `pairs`: the link a of A and the link b of B.
+        """Return frame pairs of given links.
 
-        A pair is omitted if the bodies of its two links are not matched.
+        Links of unmatched bodies are omitted.
         """
         matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
@@ -623,20 +631,19 @@ class Alignment:
 
     @property
     def depth(self) -> int:
-        """Largest number of joint pairs on a path from the base, plus 1."""
+        """Longest path in joints, plus 1."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignmentChoices:
-    """Prescribed values for an alignment, such as the pose of B's root and the zero offset of each joint.
+    """Prescribed values for an alignment.
 
     Attributes:
-        base: Links of A and B at which the search starts; None if the search chooses its first bodies.
-        X: (4, 4) pose of B's root in A's root frame.
-        zeros: Sign and zero offset of each joint, by the joint's name in A: the values `sense` and `offset`
-            of `MatchedJoints`. A joint without an entry has the sign 1 and the zero offset 0.
-        orders: Each entry lists some consecutive joints of B in their new order.
+        base: None if the search chooses.
+        X: (4, 4) pose of B's root.
+        zeros: Sign and zero offset, by A's joint name. The default is (1, 0).
+        orders: New orders of B's joints.
     """
 
     base: tuple[str, str] | None = None
@@ -652,7 +659,10 @@ AS_WRITTEN = AlignmentChoices()
 
 @dataclass(frozen=True, slots=True)
 class LinearFunction:
-    """The linear function constant + slope * variable. If the slope is 0, `variable` has no meaning."""
+    """The function constant + slope * variable.
+
+    If the slope is 0, `variable` is unused.
+    """
 
     variable: str
     slope: float
@@ -662,13 +672,19 @@ class LinearFunction:
         return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def evaluate(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the function's value; a variable that is not in `values` is 0."""
+        """Evaluate the function.
+
+        A missing variable is 0.
+        """
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class MatchedValues:
-    """The values of two matched joints, both with the positive direction and the zero of A's joint."""
+    """The values of two matched joints.
+
+    Both have the positive direction and zero of A's joint.
+    """
 
     a: LinearFunction
     b: LinearFunction
@@ -684,7 +700,7 @@ class MatchedValues:
 
     @property
     def variable(self) -> str | None:
-        """The variable that moves both joints; None if two different variables move the joints."""
+        """The common variable, or None."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -692,15 +708,13 @@ class MatchedValues:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
-    """The values of all matched joints as linear functions of some variables, and the variables' ranges.
+    """The values of all matched joints.
 
     Attributes:
-        pairs: The values of each joint pair. None if a joint of the pair is planar or floating. None also if
-            the two joints have different kinds and neither joint is fixed.
-        ranges: Range of each variable, rad or m; infinite without a limit.
-        rules: Indices of the joint pairs whose mimic rules differ. A pair of a mimic joint and an independent
-            joint can be one of these pairs.
-        coordinates: Each coordinate of B as a linear function of a variable, by the joint's name in B.
+        pairs: None for planar, floating and unlike moving joints.
+        ranges: In rad or m. Infinite without limits.
+        rules: Pairs with different mimic rules.
+        coordinates: B's coordinates, by joint name.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -715,7 +729,6 @@ class Variables:
         return ends[0], ends[1]
 
     def value_difference(self, pair: MatchedValues) -> float:
-        """Return the largest difference (rad or m) between a joint's values in A and in B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
                 LinearFunction(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
@@ -739,7 +752,7 @@ class _VariablesBuilder:
         self.depth = alignment.depth
 
     def _find_coordinates(self) -> dict[str, LinearFunction]:
-        """Return each coordinate of B: a linear function of a coordinate of A, or a new variable."""
+        """Express B's coordinates by variables."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         followers_last = sorted(own, key=self._is_mimic_in_a)
@@ -795,12 +808,10 @@ class _VariablesBuilder:
         return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.coordinates)
 
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
-        """Return whether two linear functions differ by rounding only.
+        """Return whether two functions differ by rounding only.
 
-        The functions' constants depend on zero offsets, which urdfkin computes from poses. The rounding error
-        of a pose is the sum of the errors of all joints on the path. The tolerance for the constants is the
-        sum of the errors of the joints on the longest path. The slopes do not depend on zero offsets, so the
-        tolerance for the slopes is the rounding error of one joint.
+        Slopes may differ by the error of one joint. Constants may differ by the sum of the
+        errors on the longest path. Constants depend on zero offsets, which are computed from poses.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)
@@ -812,9 +823,7 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """Return the range of each variable.
 
-        The range is the intersection of the limits of the joints that the variable moves. If this
-        intersection is empty or a single value, the range consists of A's limits. The limits of mimic joints
-        are ignored, because a mimic joint follows its rule even beyond its limits.
+        The limits of mimic joints are ignored, because the joints follow their rules.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -1,11 +1,14 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
-**Support functions.** The support function of a set W of points is h(u) = max over p in W of u . p. The
-largest distance of a point of W from the origin is the maximum of h(u) over all unit vectors u. If a rotation
-R moves W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle in a range,
-h'(u) is the largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) + u
-. p, with the p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the
-chain, without a search over joint values.
+**Support functions.** Let W be a set of points.
+
+    support function of W:            h(u) = max over p in W of u . p
+    largest distance from the origin: max of h(u) over all unit vectors u
+    after a rotation R of W:          h'(u) = h(R^T u)
+    after a range of rotations:       h'(u) = max of h(R^T u) over all angles of the range
+    after a range of translations p:  h'(u) = h(u) + max of u . p over all p of the range
+
+urdfkin computes h joint by joint along the chain, without a search over joint values.
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
@@ -13,31 +16,37 @@ angle of a range, the vectors R^T u form an arc. A polygon contains this arc, an
 is at one of its corners. At each joint, the interpolation increases the bound. The relative increase is
 proportional to the square of the distance between grid points.
 
-**Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
-position of A's frame. Let e(S t) be the motion of joint i in A, and e(S' t') its motion in B. Let L be a
-constant rigid motion before B's joint. These motions change d to
+**Recursion.** At joint i:
 
-    d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
+    y:                  position of B's frame if only the joints after joint i move
+    d:                  y minus the position of A's frame
+    e(S t), e(S' t'):   motions of joint i in A and in B
+    L:                  constant rigid motion before B's joint
 
-If joint i is the same in A and B, the first three terms are 0. For each direction u, the maximum of u . d' is
-at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
-and d. If A and B differ at several joints, the terms of these joints may be largest in different
-configurations. The sum of the maxima then exceeds the true maximum. If A and B differ only in constant
-motions L, urdfkin computes a second bound, and uses the smaller of the two bounds. For each motion L, urdfkin
-computes an upper bound on the displacement of the frame by L. The second bound is the sum of these upper
-bounds.
+    d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d
 
-**Second derivatives.** Let D = p_B - p_A, where p_A and p_B are the frame's positions in A and B. The
-function `curvature` returns upper bounds on the second derivatives of D. The function computes these bounds
-joint by joint, from the frame to the base. The derivative of a rotated vector with respect to the angle is
-the cross product of the axis u with the rotated vector. The derivatives of y and d with respect to the value
-of joint i are
+    joint i is the same in A and B:   the first three terms are 0
+    for each direction u:             max of u . d' <= sum of the maxima of the four terms
 
-    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
+urdfkin computes the maxima from the support functions of y and d. If A and B differ at several joints, the
+terms of these joints may be largest in different configurations. The sum of the maxima then exceeds the true
+maximum. If A and B differ only in constant motions L, urdfkin computes a second bound, and uses the smaller
+bound. The second bound is the sum of upper bounds on the displacements by the motions L.
 
-with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of joint i in A. The symbols S',
-u', o' and t' belong to joint i in B. The derivatives y_i and d_i are free vectors. Therefore, the joints
-between the base and joint i only rotate y_i and d_i; these joints do not translate y_i and d_i.
+**Second derivatives.** The function `curvature` computes bounds joint by joint, from the frame to the base.
+
+    D = p_B - p_A:      difference of the frame's positions in A and B
+    S, u, o, t:         screw, axis, point and value of joint i in A
+    S', u', o', t':     screw, axis, point and value of joint i in B
+    rotated vector r:   the derivative with respect to the angle is u x r
+    Y:                  e(S' t') y
+
+Derivatives of y and d with respect to the value of joint i:
+
+    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o')
+
+The derivatives y_i and d_i are free vectors. Therefore, the joints between the base and joint i only rotate
+y_i and d_i; these joints do not translate y_i and d_i.
 """
 
 from __future__ import annotations
@@ -69,10 +78,10 @@ _CORNERS = 64
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Grid points on the surface of a cube, with `cells` cells along each edge of the cube.
+    """Directions on the surface of a cube.
 
-    Each grid point represents a direction. `segments` is the number of sides of the polygon that replaces a
-    full circle of directions.
+    Attributes:
+        segments: Polygon sides for a full circle.
     """
 
     cells: int
@@ -80,7 +89,7 @@ class Grid:
 
     @property
     def points(self) -> FloatArray:
-        """The grid points (n, 3); the largest absolute coordinate of each point is 1."""
+        """The grid points (n, 3)."""
         return _points(self.cells)
 
     @property
@@ -105,13 +114,20 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """The support function (m) of a set of points, or an upper bound on it, with values at grid points."""
+    """The support function of a set of points.
+
+    `values` contains upper bounds on h (m).
+    """
 
     grid: Grid
     values: FloatArray
 
     def evaluate(self, u: FloatArray) -> FloatArray:
-        """Return upper bounds (...) on h(u) for vectors u (..., 3) of any length; 0 for the zero vector."""
+        """Return upper bounds on h(u).
+
+        Args:
+            u: (..., 3) vectors of any length.
+        """
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
         X, Y, Z = np.abs(x), np.abs(y), np.abs(z)
@@ -137,7 +153,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function after rotations by all angles from low to high (rad)."""
+        """Apply all rotations from `low` to `high` (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -145,12 +161,15 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
+        """Return h after each rotation.
 
-        For each angle (rad), let R be the rotation of the set of points about `axis`. Since h'(u) is h(R^T
-        u), the method rotates the grid points by the opposite angle. `factors` contains a multiplier for each
-        angle, or one multiplier for all angles. The multiplier scales the part of each grid point that is
-        perpendicular to the axis.
+        Args:
+            axis: Unit vector.
+            angles: (k,) angles, rad.
+            factors: Scales of the parts perpendicular to the axis.
+
+        Returns:
+            (k, n) values at the grid points.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -159,7 +178,7 @@ class Support:
         return self.evaluate(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function after translations by all distances from low to high (m)."""
+        """Apply all translations from `low` to `high` (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -169,19 +188,23 @@ class Support:
         return Support(self.grid, self.evaluate(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
-        """Return an upper bound (m) on the distance of any point of the set from a screw's line."""
+        """Bound the distance from a line."""
         x, y, _ = rotation_with_z_axis(screw.direction).T
         corners = _corners(0.0, _FULL_TURN, _CORNERS)
         u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
         return float(max((self.evaluate(u) - u @ screw.point).max(), 0.0))
 
     def max_distance(self) -> float:
-        """Return an upper bound (m) on the distance of any point of the set from the origin.
+        """Bound the distance from the origin.
 
-        Let g_k be the four corners of a grid cell. A vector u in the direction of a point of the cell is a
-        sum of c_k g_k with c_k >= 0. The angle between each g_k and the cell's centre is at most r.
-        Therefore, |u| is at least cos r times the sum of c_k |g_k|, and h(u) / |u| is at most 1 / cos r times
-        the largest h(g_k) / |g_k|.
+        For a grid cell with the corners g_k:
+
+            r:   the angle between g_k and the cell's centre is at most r
+            u:   sum of c_k g_k, c_k >= 0  (a direction in the cell)
+
+            h(u) <= sum of c_k h(g_k)
+            |u| >= cos r  sum of c_k |g_k|
+            h(u) / |u| <= max of h(g_k) / |g_k|  / cos r
         """
         largest = float((self.values / self.grid.lengths).max(initial=0.0))
         if math.isnan(largest):  # zero times infinity proves nothing
@@ -197,9 +220,10 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
 
 
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Return the corners of a polygon that contains the arc of the unit circle from angle `low` to `high`.
+    """Enclose an arc of the unit circle in a polygon.
 
-    Each corner is a pair of an angle (rad) and a distance from the circle's centre.
+    Returns:
+        Angle (rad) and radius per corner.
     """
     if high - low >= _FULL_TURN:
         half = math.pi / segments
@@ -222,11 +246,13 @@ MOST_VALUES = 1024
 def upper_bounds(
     alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE_GRID
 ) -> tuple[float, float]:
-    """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
+    """Bound the difference of a frame's poses.
 
-    The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
-    The bounds are inf if two matched moving joints are of different kinds. The bounds are also inf if the
-    difference grows without bound with the value of an unlimited joint.
+    The bounds hold for all joint values within the limits.
+
+    Returns:
+        Distance (m) and angle (rad).
+        Both are 0 if nothing differs. A result is inf if no bound is proven.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -243,10 +269,7 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints on the path to a frame, and their values.
-
-    Both lists begin with the first joint that differs between A and B.
-    """
+    """Return a frame's path from the first different joint."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -263,9 +286,9 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return an upper bound on the angle (rad) between the frame's rotations in A and B.
+    """Bound the angle between two rotations.
 
-    The bound is the sum of the largest angles that the differences between A and B can cause.
+    The bound is the sum of the largest angles of all differences.
     """
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
@@ -299,18 +322,22 @@ def _distance_bound(
 
 
 def _displacement_bound(L: FloatArray, reach: float) -> float:
-    """Return a bound (m) on the distance |(R - 1) y + p| by which L moves a point y, |y| <= `reach`."""
+    """Bound the displacement of a point y by L.
+
+    For L = (R, p) and |y| <= `reach`:
+
+        |(R - 1) y + p| <= |R - 1| reach + |p|
+    """
     rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
     return translation + _product(rotation, reach)
 
 
 def _product(factor: float, reach: float) -> float:
-    """Return factor * reach; the result is 0 if the factor is 0 and the reach is infinite."""
+    """Return the product, where 0 * inf is 0."""
     return factor * reach if factor else 0.0
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y at the frame, where the recursion starts."""
     p, end = frame.zero_pose[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point_support(grid, y - p), point_support(grid, y)
@@ -319,7 +346,6 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return the support functions of d and y after the motions of a joint; see the module docstring."""
     # Planar and floating joints allow every direction of d.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
@@ -337,7 +363,6 @@ def after_joint(
 
 
 def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
-    """Return the support functions of d and y after the constant rigid motion L; see the module docstring."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -347,7 +372,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return the support function of d after a joint's motion, before the rigid motion L is applied."""
+    """Return d after a joint, without the motion L."""
     same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis_a.direction, np.zeros(3))
@@ -363,8 +388,9 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of p' - p: a prismatic joint translates by p in A, and by p' in B.
+    """Return the support function of p' - p.
 
+    The vectors p and p' are the translations in A and B.
     The difference is largest if each joint value is at a limit.
     """
     if (name := pair.variable) is not None:
@@ -382,10 +408,10 @@ def _prismatic_difference(
 
 
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return sample values (n,) of the variable that moves a revolute joint of A and the matched joint of B.
+    """Sample the variable of two revolute joints.
 
-    The result is None if two different variables move the two joints, or if more than `MOST_VALUES` samples
-    are needed. The result is also None if a variable without limits has a slope other than 0, 1 and -1.
+    Returns:
+        None for independent angles.
     """
     if (name := pair.variable) is None:
         return None
@@ -402,20 +428,27 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
 def _common_difference(
     step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
 ) -> Support:
-    """Return the result of `d_after_joint` for two revolute joints that the same variable moves.
+    """Return d after two joints with a common variable.
 
-    `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
-    Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
-    second derivative.
+    Definitions and bounds:
 
-    Let x be the vector from A's axis to y. Let P be the projection perpendicular to A's axis, and let R be
-    the rotation about A's axis. Let x', P' and R' be the vector, the projection and the rotation for B's
-    axis. If t' = t + c, the second derivative of (e(S' t') - e(S t)) y with respect to t is R P x - R' P' x'.
-    With the directions u and u' of the axes, the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P'
-    - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes.
+        z:              samples of the variable
+        h:              distance of neighbouring samples
+        between them:   larger bound at the two samples + h^2/8 max |second derivative|
 
-    If the slopes m of t and m' of t' differ, the second derivative is at most m^2 r + m'^2 r'. The lengths r
-    and r' are the largest distances of y from A's axis and from B's axis.
+        x, x':          vectors from the axes of A and B to y
+        P, P':          projections perpendicular to the axes
+        R, R':          rotations about the axes
+        u, u':          directions of the axes
+
+        t' = t + c:     d^2/dt^2 (e(S' t') - e(S t)) y = R P x - R' P' x'
+                        |R' - R| <= 2 |u' - u| + |c|
+                        |P' - P| <= |u' - u|
+                        perpendicular part of x' - x = offset of the axes
+
+        m, m':          different slopes of t and t'
+        r, r':          largest distances of y from the axes
+                        |second derivative| <= m^2 r + m'^2 r'
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
@@ -447,14 +480,16 @@ def _common_difference(
 def _independent_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
 ) -> Support:
-    """Return the change of d that two revolute joints cause if their angles are treated as independent.
+    """Return the change of d for independent angles.
 
-    If the joint has the same axis in A and B, the joint moves a point along the same circle in A and B. Let r
-    be the radius of the circle. Let a be the largest difference between the joint angles in A and B, at most
-    pi. The distance between the point's positions in A and B is at most the chord 2 r sin(a/2).
+    Definitions and bounds:
 
-    If the axes differ, the change of d is e(S' t') y - e(S t) y; the module docstring defines these symbols.
-    The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
+        equal axes:       r:  radius of a point's circle in A and B
+                          a:  largest difference of the angles, at most pi
+                          distance <= chord 2 r sin(a/2)
+
+        different axes:   change = e(S' t') y - e(S t) y
+                          h = (h of e(S' t') y) + (h of -e(S t) y)
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -475,10 +510,12 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return the variables' names, and bounds (m) on D's second derivatives with respect to these variables.
+    """Bound the second derivatives of D.
 
-    The bounds require that one variable moves both joints of a pair, with the same slope in A and B. If any
-    other joint pair has an effect on D, all bounds are inf.
+    All bounds are inf if a relevant joint pair has different variables or slopes.
+
+    Returns:
+        n names and (n, n) bounds (m).
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -503,7 +540,11 @@ def curvature(
 def _second_derivatives(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
+    """Bound each second derivative of D.
+
+    Yields:
+        Two joints i and j <= i, and the bound.
+    """
     free = [_as_free_vectors(step) for step in steps]
     d, y = start_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
@@ -524,10 +565,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
-    """Return an upper bound on the length of d at the base.
-
-    `vectors` contains the support functions of d and y at the last joint.
-    """
+    """Bound the length of d at the base."""
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -540,10 +578,9 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y with respect to a joint's value.
+    """Return derivatives of d and y.
 
-    The module docstring defines the symbols. The result does not include the motion L, which the callers
-    apply.
+    The motion L is not included.
     """
     if step.kind != "turns":
         u, other = step.axis_a.direction, step.axis_b.direction
@@ -553,9 +590,9 @@ def _derivatives(
 
 
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x (y - o'), with the symbols of the module docstring.
+    """Return bounds on u x d and u' x (y - o').
 
-    The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
+    The bound on u x d includes (u' - u) x (Y - o') and u x (o - o').
     """
     G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
@@ -569,10 +606,7 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a joint pair with both axes through the origin, and with no translation in L.
-
-    Translations do not affect free vectors.
-    """
+    """Remove translations, which do not affect free vectors."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -582,11 +616,9 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
+    """Return the joints that affect the length of D.
 
-    Let joint i be the first joint on the path that differs between A and B. A joint before joint i usually
-    does not change the length of D. However, the variable of an earlier joint may also move a later joint of
-    the result. The result begins with the first joint of this kind, or with joint i if there is none.
+    The variable of an earlier joint may also move a later joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),

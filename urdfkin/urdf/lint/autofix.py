@@ -38,7 +38,7 @@ from urdfkin.urdf.sources import UrdfText
 #: The fixes of one pass have the same code.
 MAX_PASSES = 100
 
-#: Maximum rotation of a unit vector by rounding to doubles, rad.
+#: Bound of the rotation of a unit vector by rounding to doubles, rad.
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 

@@ -37,7 +37,7 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examination, find_local_path
 from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
-#: Version of the baseline format; it changes if a field loses its meaning.
+#: Version of the baseline format; it changes if a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -279,7 +279,7 @@ def find_known_findings(
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # After a change of an included file, all findings count as new.
+        # After a change of the xacro file or an includable file, all findings count as new.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)
@@ -292,7 +292,7 @@ def find_known_findings(
     return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
 
 
-#: Build tools of ROS skip folders with one of these files.
+#: urdfkin and ROS's build tools skip folders with one of these files.
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

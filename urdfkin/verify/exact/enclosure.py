@@ -45,10 +45,11 @@ _ENDS = np.vectorize(interval_ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """Lower and upper bounds of the true value of each number in a result.
+    """Intervals that contain the true values of a result.
 
-    Each array has the shape of the result of the `Robot` method that computes the quantity. `urdfkin` is
-    urdfkin's result. `pinocchio` is Pinocchio's result, or None if Pinocchio cannot compute the result.
+    Attributes:
+        urdfkin: urdfkin's result.
+        pinocchio: None if Pinocchio has no result.
     """
 
     quantity: str
@@ -61,18 +62,26 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower` of each interval.
 
-        The width is 0 only if the true value is a double. If the true value is not a double, the width is at
-        least the distance between two neighbouring doubles.
+        The width is 0 only if the true value is a double.
+        Otherwise, the width is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is inside its interval; raise InputError for a wrong shape."""
+        """Return whether each number of `x` is inside its interval.
+
+        Raises:
+            InputError: `x` has the wrong shape.
+        """
         x = self._check_shape(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error_bound(self, x: ArrayLike) -> FloatArray:
-        """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
+        """Return an upper bound on |x - true value|.
+
+        Raises:
+            InputError: `x` has the wrong shape.
+        """
         x = self._check_shape(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
@@ -96,11 +105,13 @@ class Enclosure:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosures:
-    """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
+    """Intervals that contain the true quantities of a frame.
 
-    Each quantity has the shape and the unit of the result of the `Robot` method with the same name. `digits`
-    is the number of decimal digits of the interval arithmetic. After the computation, the ends of the
-    intervals are rounded outward to doubles.
+    Each quantity has the shape and the unit of the `Robot` method's result.
+    The ends of the intervals are rounded outward to doubles.
+
+    Attributes:
+        digits: Decimal digits of the interval arithmetic.
     """
 
     frame: str
@@ -134,7 +145,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return intervals that contain the true results of one frame for one sample."""
+    """Enclose the true results of one sample."""
     if digits is not None:
         digits = as_int(digits, "digits", MIN_DIGITS, MAX_DIGITS)
     tree = verifier.tree

@@ -51,33 +51,35 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joints: int) -> int:
-    """Return the number of decimal digits of intervals for a path with `joints` joints.
+    """Return the number of digits for a path.
 
-    With this number of digits, an interval is narrower than the last digit of a double. The number of digits
-    increases by one for each joint on the path. One more digit makes an interval ten times narrower, and a
-    joint with an oblique axis makes an interval only about twice as wide.
+    An interval is then narrower than the last digit of a double.
+    One more digit makes an interval ten times narrower.
+    A joint with an oblique axis makes an interval about twice as wide.
     """
     return _BASE_DIGITS + joints
 
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Compute all intervals inside a `with` block with the given number of decimal digits.
+    """Compute with `digits` decimal digits inside a `with` block.
 
-    Arb has one precision for the whole process. While one thread runs such a block, a lock therefore makes
-    other threads wait.
+    Other threads wait, because Arb has one global precision.
     """
     with _precision_lock, ctx.workprec(math.ceil(digits * _BITS_PER_DIGIT) + _ADDITIONAL_BITS):
         yield
 
 
 def as_interval(value: Number) -> Number:
-    """Convert a number or a decimal to an interval; a double or an integer becomes an interval of width 0."""
+    """Convert a value to an interval.
+
+    A double or an integer becomes an interval of width 0.
+    """
     return arb(value)
 
 
 def interval_ends(x: Number) -> tuple[float, float]:
-    """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
+    """Return both ends, rounded outward to doubles."""
     # An integer is exact and needs no rounding.
     # This shortcut saves time: most results are the integer 0.
     if isinstance(x, int):
@@ -86,18 +88,18 @@ def interval_ends(x: Number) -> tuple[float, float]:
 
 
 def _round_outward(end: arb, towards: float) -> float:
-    """Round an exact number to a double in the direction `towards`."""
+    """Round an exact number in the direction `towards`."""
     found = float(end)
     inside = arb(found) > end if towards < 0.0 else arb(found) < end
     return math.nextafter(found, towards) if inside else found
 
 
 def format_decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval's midpoint as a decimal of 17 significant digits; None if the interval is too wide.
+    """Return an interval's midpoint as a decimal of 17 digits.
 
-    The radius must be at most 1e-20 times the midpoint. The decimal therefore differs from the true value by
-    at most 0.501 units of the decimal's last digit. An interval that contains 0 becomes 0 if the interval's
-    radius is at most 1e-10 times `negligible`.
+        radius <= 1e-20 |midpoint|, otherwise None
+        |decimal - true value| <= 0.501 units of the last digit
+        interval contains 0: "0" if radius <= 1e-10 negligible, otherwise None
 
     >>> with precision(50):
     ...     [format_decimal(x, 1e-15) for x in (as_interval(1) / 3, as_interval(2), arb(0.0, 1e-40))]
@@ -119,10 +121,7 @@ def format_decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Arithmetic functions for one type of number, such as intervals.
-
-    `number` converts a double, or a decimal given as text, to this type of number.
-    """
+    """Arithmetic functions for a number type."""
 
     number: Callable[[str | float], Number]
     sine_cosine: Callable[[Number], tuple[Number, Number]]
@@ -140,7 +139,7 @@ def normalise(x: Vector, kind: NumberType = INTERVALS) -> Vector:
 
 
 def rotation_about(axis: Vector, angle: Number, kind: NumberType = INTERVALS) -> Matrix:
-    """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
+    """Return the rotation about a unit axis (eq. 7.28)."""
     s, c = kind.sine_cosine(angle)
     columns = (
         eq.plus(
@@ -159,19 +158,23 @@ def rotation_from_rpy(rpy: Vector, kind: NumberType = INTERVALS) -> Matrix:
 
 
 def rotation_from_quaternion(quaternion: Sequence[Number], kind: NumberType = INTERVALS) -> Matrix:
-    """Return the rotation of a quaternion (x, y, z, w) of any length."""
+    """Return the rotation of any quaternion (x, y, z, w)."""
     length = kind.root(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
     return found
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
+    """Return the rotation nearest to M.
 
-    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (I + E) has the same orthogonal factor U as M. E is symmetric, so X^T X - I = 2 E + E^2. The eigenvalues
-    of E are above -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - I|. This bound is added to the
-    radius of each interval.
+    M must be nearly a rotation.
+
+        M = U H: polar decomposition, U is the nearest rotation
+        X - X (X^T X - I)/2: step of Newton's iteration, doubles the number of correct digits
+        X = U (I + E): result, with the same orthogonal factor U as M
+        E is symmetric: X^T X - I = 2 E + E^2
+        eigenvalues of E > -1: |E| <= |2 E + E^2|
+        |X - U| <= |X^T X - I|: added to the radius of each interval
     """
     with ctx.workprec(ctx.prec + _NEWTON_BITS):
         for _ in range(6):
@@ -184,7 +187,7 @@ def nearest_rotation(M: Matrix) -> Matrix:
 
 
 def _orthogonality_defect(M: Matrix) -> Matrix:
-    """Return M^T M - I, which is 0 for a rotation."""
+    """Return M^T M - I."""
     gram = eq.product(eq.transposed(M), M)
     x, y, z = (eq.minus(row, unit) for row, unit in zip(gram, IDENTITY, strict=True))
     return x, y, z
@@ -196,10 +199,14 @@ _FIRST_QUATERNION_VERSION = (1, 1)
 
 @dataclass(frozen=True, slots=True)
 class ExactJoint:
-    """The numbers of one joint in the URDF text, not rounded to doubles.
+    """A joint's exact numbers in the URDF text.
 
-    `R` and `p` (m) are the pose of the joint frame in the parent link. `axis` is a unit vector in the joint
-    frame. Without a mimic rule, `multiplier` is 1 and `offset` is 0.
+    Attributes:
+        R: Rotation in the parent link.
+        p: Origin in the parent link, m.
+        axis: Unit vector in the joint frame.
+        multiplier: 1 without a mimic rule.
+        offset: 0 without a mimic rule.
     """
 
     R: Matrix
@@ -212,20 +219,13 @@ class ExactJoint:
 def read_exact_joints(
     text: str, tree: KinematicTree, joint_indices: Iterable[int] | None = None, kind: NumberType = INTERVALS
 ) -> dict[int, ExactJoint]:
-    """Return a dictionary from a joint's index to the joint's numbers in the URDF text, not rounded.
-
-    `joint_indices` contains the indices of the joints; None means all joints.
-    """
+    """Read the exact numbers of joints."""
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if joint_indices is None else joint_indices
     return {i: exact_text.find_joint(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors that result from rounding the URDF's decimals to doubles.
-
-    `path` contains the indices of the joints on a path. `q` (n, nq) contains the configurations.
-    """
     return _ExactText(text).conversion_errors(tree, path, q)
 
 
@@ -278,7 +278,6 @@ class _ExactText:
         return x, y, z
 
     def has_quaternion(self, origin: Element | None) -> bool:
-        """Return whether `quat_xyzw` gives an origin's rotation; URDF before 1.1 ignores this attribute."""
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def parse_rotation(self, origin: Element | None) -> Matrix:
@@ -287,10 +286,7 @@ class _ExactText:
         return rotation_from_rpy(self.parse_vector(origin, "rpy", "0 0 0"), self.kind)
 
     def resolve_rule(self, name: str) -> tuple[Number, Number]:
-        """Return the numbers M and C of a mimic joint.
-
-        The value of the mimic joint is M q + C, where q is the value of the independent joint.
-        """
+        """Return M and C of the joint value M q + C."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -333,9 +329,9 @@ class _ExactText:
         return DecimalErrors(angles, rules, np.array(lengths))
 
     def bound_value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
-        """Return bounds on a joint's value and on the rounding error of this value.
+        """Bound a joint's value and rounding error.
 
-        `at` maps the names of the independent joints to the values of these joints.
+        `at` contains the values of the independent joints.
         """
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
@@ -347,14 +343,14 @@ class _ExactText:
 
 
 class _ValueBound(NamedTuple):
-    """Upper bounds on a joint's value M q + C and on the rounding error of this value.
+    """Bounds on a joint's value M q + C.
+
+    C has one term for each mimic rule.
 
     Attributes:
         scaled_coordinate: |M q|.
-        offset: Sum of the absolute values of the terms of C; C has one term for each mimic rule.
-        error: Bound on the rounding error of the value, in eps, for a program that applies the mimic rules
-            one after the other.
-        rule_count: Number of mimic rules.
+        offset: Sum of |c| over the terms c of C.
+        error: Rounding error, eps. A program applies the rules one after the other.
     """
 
     scaled_coordinate: Any

@@ -39,10 +39,7 @@ _FREE_AXES = {
 
 
 def make_base_state(base: BaseNumbers) -> LinkState:
-    """Return the base's motion as the position, velocity and acceleration of the root link.
-
-    The base's rotation matrix is replaced by the nearest rotation.
-    """
+    """Return the base's motion as a link state."""
 
     def vector(x: FloatArray) -> Vector:
         return as_interval(x[0]), as_interval(x[1]), as_interval(x[2])
@@ -54,7 +51,7 @@ def make_base_state(base: BaseNumbers) -> LinkState:
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
-    """Motion and Jacobian columns of the links in one sample; the keys are link indices."""
+    """Motion and Jacobian columns, by link index."""
 
     states: Mapping[int, LinkState]
     columns: Mapping[int, tuple[Column, ...]]
@@ -70,12 +67,9 @@ def compute_motion(
     *,
     base: LinkState | None = None,
 ) -> ExactMotion:
-    """Return the motion of the links that `joints` connect, for one sample.
+    """Compute the motion of the links for one sample.
 
-    If `base` is None, the root is fixed.
-
-    `joints` is a result of `read_exact_joints`. The order is from the root outwards: a joint comes after its
-    parent joint.
+    In `joints`, each joint comes after its parent joint.
     """
     q, v, a = (list(map(as_interval, numbers)) for numbers in (q, v, a))
     states = {0: base or LinkState()}
@@ -125,22 +119,21 @@ def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
 
 
 def velocity_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the velocity (6,) of a link, [linear; angular]."""
     s = motion.states[link]
     return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
 def acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the classical acceleration (6,) of a link, [linear; angular]."""
+    """Return the classical acceleration of a link."""
     s = motion.states[link]
     return _as_array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
 def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the spatial acceleration (6,) of a link, [linear; angular].
+    """Return the spatial acceleration of a link.
 
-    The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
-    part refers to the body point at the world origin, so alpha x p is subtracted.
+    linear = acc - w x vel
+    in WORLD, at the world origin: linear - alpha x p
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
@@ -160,7 +153,6 @@ def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -
 
 
 def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
         # NumPy cannot multiply an interval by an array.

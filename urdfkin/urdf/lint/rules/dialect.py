@@ -266,7 +266,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: Longer tags cannot be a misspelt `link` or `joint`.
+#: Minimum length of tags that cannot be a misspelt `link` or `joint`.
 _MAX_TAG_LENGTH = 8
 
 

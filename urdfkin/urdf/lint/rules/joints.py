@@ -118,7 +118,7 @@ def _check_root(report: Reporter, robot: RobotRecord) -> bool:
         report.add(CYCLE, "no link is a root: every link is the child of a joint", robot.element)
     if len(roots) < 2:
         return len(roots) == 1
-    # Each link without a parent may be the intended child.
+    # If a child link is missing, each link without a parent may be the intended child.
     if not children <= robot.links.keys():
         return False
     parents = {joint.parent for joint in robot.joints}
@@ -502,15 +502,15 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: Larger coordinates of a joint origin (m) are probably millimetres.
+#: From this size, coordinates of a joint origin (m) are probably millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
 #: Below this total length (m), lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: Whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
+#: Limits that are whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
 #: `PLACEHOLDER_LIMIT` itself is excluded.
-#: Some exporters write larger limits for joints without limits.
+#: For joints without limits, some exporters write limits of `PLACEHOLDER_LIMIT` or more.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
 #: An angle of 1.57 instead of pi/2 displaces later links.
