@@ -30,18 +30,14 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code for an export, with exact constants if the language `to` is sympy-exact.
-
-    For all other languages, the result is `code`. Raise VerificationError if the results of the exact
-    expressions differ from Pinocchio's results.
-    """
+    """Return exact code for sympy-exact, otherwise `code`."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
-    """Return the text of an exported file with its digest.
+    """Return an exported file's sealed text.
 
-    `file` is the name under which the file will be stored; the commands in its comments use this name.
+    `file` is the name in comments.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

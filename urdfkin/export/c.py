@@ -1,10 +1,14 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
-The exported code allocates no memory and has no global variables. Each function is straight-line code. It
-computes one configuration, or `LANES` configurations together. In the arrays of the straight-line code,
-consecutive numbers of one configuration are `L` elements apart. Here, `L` is 1 for one configuration, and
-`LANES` for `LANES` configurations. If `L` is `LANES`, a compiler turns each line of code into vector
-instructions. The templates in the folder `templates/` contain the code that all robots share.
+The exported code allocates no memory and has no global variables. Each function is straight-line code for one
+configuration, or for `LANES` configurations. Consecutive numbers of one configuration are `L` elements apart:
+
+| Configurations | `L` |
+|---|---|
+| one | 1 |
+| `LANES` | `LANES`; a compiler turns each line into vector instructions |
+
+The folder `templates/` contains the code that all robots share.
 """
 
 from __future__ import annotations
@@ -23,7 +27,10 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
-    """Return a C file; if the macro `NAME_DECLARATIONS` is defined, only declarations are compiled."""
+    """Return a C file.
+
+    If the macro `NAME_DECLARATIONS` is defined, only declarations are compiled.
+    """
     return c_file(
         code,
         comment_block(_header_lines(code)),
@@ -44,7 +51,7 @@ def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
 
 
 def fill_template(name: str, /, **texts: str | int) -> str:
-    """Read a template, and replace each placeholder `@name@` by `texts[name]`."""
+    """Fill a template's placeholders, `@name@`."""
     template = (_TEMPLATES / name).read_text(encoding="utf-8")
     return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 
@@ -78,7 +85,7 @@ def _header_lines(code: FrameCode) -> list[str]:
 
 
 def describe_result(function: Function) -> str:
-    """Return the shape of a result and its equations, as in "4 x 4, eq. 7.77"."""
+    """Return text such as "4 x 4, eq. 7.77"."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
@@ -137,7 +144,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def count_reserved(code: FrameCode, function: Function) -> int:
-    """Return the least number of configurations for which every array has at least eight numbers.
+    """Count configurations until every array has eight numbers.
 
     Arrays without numbers do not count.
     """
@@ -150,10 +157,9 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 
 
 class InputLayout:
-    """The order of the numbers in the array `in` of the C code.
+    """Layout of the C array `in`.
 
-    The array contains, in this order: inputs that are not angles, inputs that are angles, computed angles,
-    sines, cosines.
+    The order is other inputs, input angles, computed angles, sines, cosines.
     """
 
     def __init__(self, function: Function) -> None:
@@ -249,7 +255,10 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main_program(code: FrameCode, *templates: str) -> str:
-    """Return a program that runs the test vectors. `templates` are file names, for example "check_one.c"."""
+    """Return a program with test vectors.
+
+    `templates` are names such as "check_one.c".
+    """
     checks = (_check(code, function, template) for function in code.functions for template in templates)
     return fill_template("check.c", checks="".join(checks))
 

@@ -1,12 +1,11 @@
 """Check the seal of an exported file, compile or import the file, and run the file's test vectors.
 
-The seal is a line in the header of an exported file. This line contains the digest of the file's text. The
-seal shows whether the header, the code or the test vectors of the file were changed. A seal is not a
-signature, so it does not prove who wrote the file.
+The seal is a line in the header with the digest of the file's text. The seal shows whether the header, the
+code or the test vectors were changed. A seal is not a signature, so it does not prove who wrote the file.
 
-The check runs the file as code. Before you check a file from another person, consider whether you would run
-that person's programs. The check runs a copy of the file in a separate folder. In the original folder, the
-file could import another file by accident, for example a `math.py`.
+The check runs the file as code. Check a file from another person only if you would run that person's
+programs. The check runs a copy in a separate folder. In the original folder, the file could import another
+file by accident, for example a `math.py`.
 """
 
 from __future__ import annotations
@@ -48,12 +47,15 @@ _TIME_LIMIT = 600.0
 
 
 def seal(text: str) -> str:
-    """Replace the 64 zeros in the file's header by the digest."""
+    """Insert the digest into the header."""
     return _SEAL_LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 
 def _has_valid_seal(text: str) -> bool | None:
-    """Return whether the file's digest is correct; None without a digest."""
+    """Return whether the digest is correct.
+
+    None without a digest.
+    """
     text = text.replace("\r\n", "\n")
     if (found := _SEAL_LINE.search(text)) is None:
         return None
@@ -66,7 +68,11 @@ def _digest(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FileCheck:
-    """Result of a check; `warnings` are the reasons why the file is not verified."""
+    """Result of a check.
+
+    Attributes:
+        warnings: Why the file is not verified.
+    """
 
     lines: tuple[str, ...]
     passed: bool
@@ -78,11 +84,7 @@ class FileCheck:
 
 
 def check(file: Path) -> FileCheck:
-    """Compile or import an exported file, and run the test vectors in the file.
-
-    Raise InputError if the file is not an exported file, or if the file cannot run on this computer. Raise
-    SourceError if the file cannot be read.
-    """
+    """Run an exported file's test vectors."""
     text = read_text(file)
     if EXPORT_MARK not in text[:_HEADER_LENGTH]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
@@ -119,7 +121,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Compile a file and run the file's test vectors, in double and in single precision.
+    """Run the vectors in both precisions.
 
     Without a GPU, only the CPU functions of a CUDA file are checked.
     """
@@ -165,7 +167,7 @@ def _find_program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Run a command, and return the output lines that begin with "good" or "WRONG"."""
+    """Return lines that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,

@@ -28,12 +28,14 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 @dataclass(frozen=True)
 class FrameCode:
-    """The functions of a frame. No name contains characters that end a comment in the exported file.
+    """The functions of a frame.
 
-    `identifiers` contains the names that the exported code uses. For the keys "q", "v" and "a", there is a
-    name for each number of this input. For the key "s", there is a name for each joint of the path.
-    `maybe_proof` is None for code that urdfkin compiles for its own use. `exact` returns this code with exact
-    constants.
+    No name can end a comment.
+
+    Attributes:
+        identifiers: Names for the keys "q", "v", "a" and "s" (joints).
+        maybe_proof: None for code that is not exported.
+        exact: Returns code with exact constants.
     """
 
     name: str
@@ -72,7 +74,10 @@ class FrameCode:
 
     @property
     def header(self) -> list[str]:
-        """Lines of a file's header; the first line marks unverified code."""
+        """Lines of a file's header.
+
+        The first line marks unverified code.
+        """
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
         about = f"Kinematics of {subject}: {EXPORT_MARK}."
@@ -105,9 +110,9 @@ def make_verified_code(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Make the functions of a frame, and test vectors for the functions.
+    """Make functions and their test vectors.
 
-    The results of the functions are compared with Pinocchio's results, unless verification is switched off.
+    Pinocchio checks the functions unless verification is off.
     """
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
@@ -176,7 +181,10 @@ def _parse_quantities(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writes expressions as code. If `sine` is False, sines and cosines are inputs of the code."""
+    """Writes expressions as code.
+
+    If `sine` is False, sines and cosines are inputs.
+    """
 
     def __init__(
         self,
@@ -206,7 +214,7 @@ class Writer:
         return [node for node in self.function.nodes if node.op in leaves and node in self.dependencies]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-        """For each joint of the path, yield a comment and a list of assignments (name, value)."""
+        """Yield a comment and assignments for each step."""
         nodes = [x for x in self.function.statements if x in self.dependencies and x.op not in self.leaves]
         for step, group in groupby(nodes, key=lambda node: node.step):
             assigned = list(group)
@@ -227,7 +235,7 @@ class Writer:
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, precedence: int = _SUM) -> str:
-        """Return an expression as text, in brackets if its operator has a lower precedence."""
+        """Return an expression, bracketed if necessary."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.variables or x.op in self.code.identifiers:
@@ -240,7 +248,7 @@ class Writer:
         return _arithmetic(x, self.text, precedence)
 
     def expand(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
-        """Return an expression as text, with inputs and constants instead of variables."""
+        """Return an expression without variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.identifiers:

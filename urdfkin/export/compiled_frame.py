@@ -1,12 +1,11 @@
 """Compile the kinematics of one frame to machine code, the fastest way to compute in urdfkin.
 
-The first call of a quantity exports C code, and compiles the code with the system's compiler. The first call
-also compares the results of the machine code with Pinocchio. Without a C compiler, urdfkin uses the forward
-recursion, which Numba compiles.
+The first call of a quantity compiles exported C code with the system's compiler, and compares the results
+with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
-A cache stores the machine code with checksums. The key in the cache consists of the C code, the compiler and
-the processor. The code is loaded from memory, because another program could change a file after the test of
-the checksum.
+A cache stores the machine code with checksums. The key consists of the C code, the compiler and the
+processor. The code is loaded from memory, because another program could change a file after the test of the
+checksum.
 """
 
 from __future__ import annotations
@@ -52,15 +51,14 @@ _load_counter = count()
 
 
 class NoCompilerError(Exception):
-    """There is no C compiler, or the compiler rejects the code."""
+    """No C compiler accepts the code."""
 
 
 def load_library(code: FrameCode) -> ctypes.CDLL:
-    """Compile code that consists of one function, and load the library.
+    """Compile one function, and load the library.
 
-    The library's function `task` has one argument, an array with the fields of `KernelArgs`. The function
-    returns 1 if an input is not finite, and 0 otherwise. Raise NoCompilerError if there is no C compiler, or
-    if the compiler rejects the code.
+    The library's function `task` takes an array with the fields of `KernelArgs`. `task` returns 1 if an
+    input is not finite.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
@@ -158,7 +156,7 @@ def _compiler_version(compiler: str) -> str:
 
 @cache
 def _processor_features() -> str:
-    """Return the processor's features, on which the option `-march=native` depends."""
+    """Return the features for `-march=native`."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -199,13 +197,13 @@ class _ExportedRobot(Protocol):
 
 
 class CompiledFrame:
-    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compile`.
+    """Compiled functions for one robot frame: the result of `Robot.compile`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
-    exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
-    not finite, is an error. The machine code is compared with Pinocchio once, on a hundred configurations,
-    unless the robot is loaded with `verify=False`. The results of later calls are not compared, and
-    `Robot.certificate` reports them as unchecked.
+    exactly the same result in a batch and in a single call. A wrong shape or a number that is not finite is
+    an error. The machine code is compared with Pinocchio once, on more than a hundred configurations. After
+    `load(verify=False)`, this comparison is omitted. `Robot.certificate` reports the results of later calls
+    as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -238,7 +236,9 @@ class CompiledFrame:
     def placement(
         self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """Return T_world_frame (..., 4, 4), eq. 7.77; arguments and errors as for `Robot.placement`.
+        """Return T_world_frame (..., 4, 4): eq. 7.77.
+
+        Arguments and errors are those of `Robot.placement`.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").compile("tip")
@@ -403,10 +403,9 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[ConfigurationLike], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether the machine code can use all arguments without a copy or a check of values.
+        """Return whether the machine code accepts these arguments.
 
-        The class `Call` converts all other arguments. For a large batch, this conversion takes a tenth of the
-        time.
+        The conversion by `Call` takes a tenth of a large batch's time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

@@ -24,7 +24,7 @@ from urdfkin.export.function import Function
 def write(code: FrameCode, to: str = "cpp") -> str:
     """Return the text of a header.
 
-    With the macro `NAME_MAIN`, the header compiles to a program that runs the test vectors.
+    The macro `NAME_MAIN` adds a program that runs the test vectors.
     """
     return _cuda(code) if to == "cuda" else _cpp(code)
 

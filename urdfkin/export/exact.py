@@ -1,9 +1,12 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are the URDF's decimals as fractions. An angle that equals a multiple of pi/12 in double
-precision is replaced by this multiple. For example, 1.5707963267948966 becomes pi/2. Rational square roots
-become fractions. Sines and cosines of multiples of pi/2 become integers. All other square roots, sines and
-cosines remain expressions.
+| Number | Exact form |
+|---|---|
+| constant | the URDF's decimal as a fraction |
+| angle that equals a multiple of pi/12 in double precision | pi/2 instead of 1.5707963267948966 |
+| rational square root | fraction |
+| sine or cosine of a multiple of pi/2 | integer |
+| other square root, sine or cosine | expression |
 """
 
 from __future__ import annotations
@@ -57,7 +60,11 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """Expressions with exact constants; `pi_multiples` maps each replaced angle to its multiple of pi."""
+    """Expressions with exact constants.
+
+    Attributes:
+        pi_multiples: The multiple of each replaced angle.
+    """
 
     zero = 0
 
@@ -71,7 +78,7 @@ class ExactGraph(Graph):
         return super().make_node(op, *operands)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Return a constant angle; a multiple of pi/12 becomes a `PiMultiple`."""
+        """Replace multiples of pi/12 by `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _MAX_ANGLE else None
         return x if factor is None else self.pi_multiples.setdefault(x, PiMultiple(factor))
 
@@ -115,9 +122,9 @@ def make_exact_plan(
 
 
 def _aligning(axis: Vector, z: float) -> Matrix:
-    """Return a rotation matrix whose third column is `axis`, by the formula in `rotation_with_z_axis`.
+    """Return a rotation matrix with third column `axis`.
 
-    The vector `axis` has unit length, and `z` is its third component as a float.
+    See `rotation_with_z_axis`. `axis` is a unit vector. `z` is the third component as a float.
     """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
@@ -131,7 +138,6 @@ def _aligning(axis: Vector, z: float) -> Matrix:
 
 
 def to_interval(x: Number) -> Number:
-    """Return an exact constant as an interval (midpoint and radius)."""
     if isinstance(x, PiMultiple):
         return as_interval(0).pi() * to_interval(x.factor)
     return as_interval(x.numerator) / x.denominator if isinstance(x, Fraction) else as_interval(x)
@@ -150,7 +156,6 @@ _OPERATIONS: dict[str, Callable[..., Number]] = {
 
 
 def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
-    """Return the results for one configuration as intervals."""
     values: dict[Any, Number] = {}
 
     def value(x: Number) -> Number:
@@ -166,11 +171,11 @@ def evaluate_intervals(function: Function, inputs: Sequence[Sequence[float]]) ->
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks of an exported file whose constants are exact.
+    """The checks of an exact file.
 
-    `angle_count` is the number of different angles that were replaced by multiples of pi.
-    `max_angle_change` is the largest difference (rad) between an angle and the multiple of pi that replaces
-    it.
+    Attributes:
+        angle_count: Number of different replaced angles.
+        max_angle_change: Largest change of an angle, rad.
     """
 
     angle_count: int = 0
@@ -196,9 +201,9 @@ def make_exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Make functions with exact constants, and compare the functions with Pinocchio.
+    """Make and check exact functions.
 
-    The returned proof has the same test vectors as the argument `proof`.
+    The test vectors are those of `proof`.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
@@ -224,7 +229,7 @@ def make_exact_functions(
 
 
 def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Return the results (n, ...), computed at fifty digits and rounded."""
+    """Evaluate at fifty digits, then round."""
     with precision(DIGITS + enough_digits(len(function.plan.steps))):
         rows = [
             list(map(float, evaluate_intervals(function, one)))
@@ -234,7 +239,7 @@ def _evaluate_exactly(function: Function, inputs: Sequence[FloatArray]) -> Float
 
 
 def format_literal(x: Number) -> str:
-    """Return a constant as code for SymPy: `2`, `Rational(17, 40)`, `pi/2`."""
+    """Return code such as `Rational(17, 40)`."""
     if isinstance(x, PiMultiple):
         text = format_pi_fraction(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
         return text if x.factor > 0 else f"(-{text})"

@@ -1,10 +1,17 @@
 """Symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each new expression. Constants are Python floats, so an operation on constants gives a
-float, not a node. Products with 0 and 1 and sums with 0 are removed. A product (-x) y becomes -(x y), and a
-sum x + (-y) becomes the difference x - y. Equal expressions are the same node, so the sine and the cosine of
-each joint occur once.
+The graph simplifies each new expression:
+
+| Expression | Simplified expression |
+|---|---|
+| operation on constants (floats) | float |
+| product with 0 or 1, sum with 0 | 0, or the other number |
+| (-x) y | -(x y) |
+| x + (-y) | x - y |
+| equal expressions | the same node |
+
+The sine and the cosine of each joint therefore occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.make_input("q", 0), graph.make_input("q", 1)
@@ -28,15 +35,15 @@ _EQUATIONS = re.compile(r"(?:7\.\d+(?:, )?)+")
 
 
 class Node:
-    """An expression: an input, or an operation on other expressions.
+    """An input or an operation.
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        operands: The operands of an operation: nodes and constants. For an input, the index; for example, 3
-            for the input q[3].
-        index: Number of the expression in the order of creation; operands have smaller numbers.
-        step: Index of the recursion's step that created this expression. The first steps are the joints of
-            the path; the last steps are the final frame and the results.
+        operands: Nodes and constants, or an input's index.
+        index: Number in the order of creation.
+            Operands have smaller numbers.
+        step: Index of the recursion's step.
+            The joints come first, then the frame and the results.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "op", "operands", "step")
@@ -78,7 +85,7 @@ class Node:
 
 
 class Graph:
-    """The expressions of one function; each node stores the number of the equation that created the node."""
+    """The expressions of one function."""
 
     #: Products with 0 and differences x - x become this constant.
     zero: float = 0.0
@@ -92,7 +99,10 @@ class Graph:
         return self.make_node(letter, index)
 
     def make_node(self, op: str, *operands: Any) -> Node:
-        """Return the node of an operation; equal operations on the same operands have the same node."""
+        """Return the node of an operation.
+
+        Equal operations share a node.
+        """
         key = (op, *operands)
         if (node := self._nodes.get(key)) is None:
             node = self._nodes[key] = Node(self, op, operands, len(self._nodes))
@@ -139,10 +149,9 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that calls an equation, and stores the equation's number in each new node.
+        """Make an equation store its number in new nodes.
 
-        `equation` may call the function of another equation. The nodes that this function creates also store
-        the number of `equation`.
+        Nested equations store the outer equation's number.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -167,20 +176,26 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return the expression y if x is -y. Return -x if x is a negative constant. Otherwise, return None."""
+    """Return -x for a negation or negative constant x.
+
+    Otherwise return None.
+    """
     if isinstance(x, Node):
         return x.operands[0] if x.op == "neg" else None
     return -x if x < 0.0 else None
 
 
 def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
-    """Return operands in a fixed order, so that x + y and y + x are the same node."""
+    """Sort operands of a commutative operation."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
 def find_dependencies(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
-    """Return all nodes that the results depend on; operations in `leaves` count as inputs."""
+    """Return all nodes of the results.
+
+    Operations in `leaves` count as inputs.
+    """
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

@@ -54,7 +54,10 @@ def make_chain_code(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return the code for the last frame of a chain. The chain's base is the world frame."""
+    """Return code for the last frame.
+
+    The chain's base is the world frame.
+    """
     if isinstance(chain, DHTable):
         text, chain = table_document(chain, Units()).text(), _replace_unsafe_names(chain)
     else:
@@ -80,7 +83,7 @@ def make_chain_code(
 
 
 def _replace_unsafe_names(table: DHTable) -> DHTable:
-    """Replace each joint name and each frame name that a URDF does not allow."""
+    """Replace names that a URDF does not allow."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -1,16 +1,23 @@
 """Make a function of the exported code, and bound the rounding errors of the function.
 
-Each function computes one quantity of one frame. An expression that occurs more than once in the exported
-code is assigned to a variable. Each sine, cosine, square root and quotient is assigned to a variable. Each
-number of a link's pose, velocity and acceleration is assigned to a variable. A long expression is split into
-several assignments. All other expressions are parts of larger expressions.
+Each function computes one quantity of one frame. These expressions are assigned to variables:
 
-`single_bounds` bounds the rounding errors of a function in single precision. Each operation and each constant
-of the code has a rounding error, which `urdfkin.kinematics.roundings` derives. To first order in eps, the
-error of a result is a sum of products. Each operation and each constant gives one product. The first factor
-is the rounding error of this operation or constant. The second factor is the derivative of the result with
-respect to the value of this operation or constant. The bound is the sum of the absolute values of these
-products. One backward pass over the operations computes the derivatives of all results.
+    an expression that occurs more than once
+    a sine, cosine, square root or quotient
+    a number of a link's pose, velocity or acceleration
+    a part of a long expression
+
+All other expressions are parts of larger expressions.
+
+**Single precision.** `single_bounds` bounds the rounding errors to first order in eps:
+
+    x_i: value of an operation or constant of the code
+    e_i: rounding error of x_i (`urdfkin.kinematics.roundings`)
+    y: a result
+    error of y = sum of e_i dy/dx_i
+    bound of y = sum of |e_i dy/dx_i|
+
+A backward pass over the operations computes the derivatives.
 """
 
 from __future__ import annotations
@@ -49,7 +56,11 @@ _MAX_RESULTS = 512
 
 @dataclass(frozen=True, eq=False)
 class Function:
-    """Straight-line code for one quantity; `results` are constants and expressions, row by row."""
+    """Straight-line code for one quantity.
+
+    Attributes:
+        results: Constants and expressions, row by row.
+    """
 
     quantity: Quantity
     reference: Reference
@@ -62,7 +73,7 @@ class Function:
 
     @property
     def inputs(self) -> str:
-        """The letters of the inputs: "q", "qv" or "qva"."""
+        """Letters "q", "qv" or "qva"."""
         return self.quantity.inputs
 
     @property
@@ -71,7 +82,7 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """All expressions that the results need; an expression comes after its operands."""
+        """Expressions of the results, operands first."""
         return find_dependencies(self.results)
 
     @cached_property
@@ -111,7 +122,10 @@ class Function:
         return set(find_dependencies(self.results, leaves))
 
     def node_values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
-        """Return the value (n,) of each expression for q (n, nq), v and a (n, nv)."""
+        """Return each expression's values (n,).
+
+        `inputs` are q (n, nq), v and a (n, nv).
+        """
         value: dict[Node, Any] = {}
         arrays = dict(zip(INPUT_LETTERS, inputs, strict=False))
         for node in self.nodes:
@@ -124,7 +138,10 @@ class Function:
         return value
 
     def evaluate(self, inputs: Sequence[FloatArray]) -> FloatArray:
-        """Return the results (n, ...) for q (n, nq), v and a (n, nv), computed with NumPy."""
+        """Evaluate the results (n, ...).
+
+        `inputs` are q (n, nq), v and a (n, nv).
+        """
         value = self.node_values(inputs)
         out = np.empty((len(inputs[0]), len(self.results)))
         for k, x in enumerate(self.results):
@@ -156,16 +173,16 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 
 
 def _strip_minus(node: Node) -> Node:
-    """Return x if the expression is -x; exported code stores x in a variable, and negates x at each use."""
+    """Return x for the expression -x."""
     return node.operands[0] if node.op == "neg" else node
 
 
 def make_function(
     plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
 ) -> Function:
-    """Return the function that computes a quantity for the only frame of `plan`.
+    """Make the function of one frame.
 
-    If constants of `plan` are expressions, `graph` must be the graph that contains these expressions.
+    If `plan` contains expressions, `graph` must contain the same expressions.
     """
     graph = graph or Graph()
 
@@ -187,7 +204,7 @@ def make_function(
 
 
 def _name_nodes(step: int, state: LinkState) -> None:
-    """Name the numbers of a link's state after the textbook's symbols, for example `w2_z`."""
+    """Name nodes, for example `w2_z`."""
     named = {f"R{step + 1}_{r}{c}": x for r, row in enumerate(state.R) for c, x in enumerate(row)}
     for letter in ("p", "w", "vel", "alpha", "acc"):
         vector = getattr(state, letter)
@@ -202,11 +219,10 @@ def _name_nodes(step: int, state: LinkState) -> None:
 
 @np.errstate(all="ignore")
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
+    """Bound (n, results) errors in single precision.
 
-    The inputs q (n, nq), v and a (n, nv) are single-precision numbers. The bounds do not include the rounding
-    errors of the code's constants in double precision. A bound is inf if the code computes a number beyond
-    the range of single precision.
+    The unit is eps = 2^-23. The inputs must be single-precision numbers. Errors of the constants in double
+    precision are excluded. Beyond the range of single precision, the bound is inf.
     """
     value = function.node_values(inputs)
     bounds = np.zeros((len(inputs[0]), len(function.results)))
@@ -222,9 +238,9 @@ def _bounds_of_results(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives of the results with respect to the expression x.
+        """Add `slope` to the derivatives with respect to x.
 
-        If x is a constant, increase the bounds by the error due to the rounding of x.
+        A constant increases the bounds.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant_error(x)
@@ -248,7 +264,7 @@ def _bounds_of_results(
 
 
 def _operation_error(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding error (n,) of an operation with results x (n,), in eps."""
+    """Return rounding errors (n,) in eps."""
     size = np.abs(x)
     if node.op in INPUT_LETTERS:
         error = np.zeros_like(size)
@@ -260,12 +276,15 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant_error(x: float) -> float:
-    """Return the error of a constant that is rounded to single precision, in eps."""
+    """Return a constant's error, in eps."""
     size = np.abs(x)
     return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add the error of each number that underflows; return inf for each number that overflows."""
+    """Add errors of numbers that underflow.
+
+    Overflow gives inf.
+    """
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

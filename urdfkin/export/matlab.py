@@ -1,4 +1,7 @@
-"""Write a file for MATLAB and Octave, whose main function returns all other functions and the check."""
+"""Write a file for MATLAB and Octave.
+
+The main function returns all other functions and the check.
+"""
 
 from __future__ import annotations
 

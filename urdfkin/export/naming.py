@@ -1,7 +1,7 @@
-"""Convert the names in a URDF to identifiers and comments for exported code.
+"""Convert names in a URDF to identifiers and comments for exported code in every language.
 
-The identifiers and comments are valid in every language. Identifiers are short, ASCII and unique. The
-exported code adds a prefix such as `s_` or `q_`, so that no identifier is a keyword.
+Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
+identifier is a keyword.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _MAX_COMMENT_LENGTH = 80
 
 
 def safe_name(name: str) -> str:
-    """Return a name with only letters, digits and single underscores.
+    """Return letters, digits and single underscores.
 
     >>> safe_name("panda_joint1"), safe_name("*/ int x; //"), safe_name("%")
     ('panda_joint1', 'int_x', 'x')
@@ -27,7 +27,9 @@ def safe_name(name: str) -> str:
 
 
 def unique_safe_names(names: Iterable[str]) -> list[str]:
-    """Return a different identifier for each name, even for a language that ignores case.
+    """Return a different identifier for each name.
+
+    Identifiers also differ if case is ignored.
 
     >>> unique_safe_names(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
@@ -44,7 +46,7 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 
 
 def function_prefix(robot: str, frame: str) -> str:
-    """Return the prefix of the exported functions of a frame; the prefix begins with a letter.
+    """Return a prefix that begins with a letter.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')
@@ -61,10 +63,9 @@ def comment_name(name: str) -> str:
 
 
 def comment_text(text: str) -> str:
-    r"""Return a text that can be written into a comment of exported code in any language.
+    """Replace characters that could end a comment.
 
-    An underscore replaces each character that is not printable ASCII, and each character that could close the
-    comment. Question marks are replaced too, because C's trigraphs, such as ??/, contain question marks.
+    C's trigraphs, such as ??/, contain question marks.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

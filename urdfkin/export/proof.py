@@ -1,10 +1,15 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
-The test vectors check the file, and also the user's compiler, language version and libraries. A test vector
-contains inputs and true values at fifty digits. The true values are computed from the URDF's decimals. For
-each true value, the file has a bound on the rounding errors of a correct computation. The unit of the bound
-is eps: 2^-52 in double precision, and 2^-23 in single precision. The inputs are single-precision numbers, so
-they are equal in single and in double precision.
+The test vectors check the file, and also the user's compiler, language version and libraries:
+
+| Part | Numbers |
+|---|---|
+| inputs | single-precision numbers, equal in both precisions |
+| results | true values at fifty digits, from the URDF's decimals |
+| tolerances | bounds on the rounding errors of a correct computation, in eps |
+
+    eps = 2^-52 in double precision
+    eps = 2^-23 in single precision
 """
 
 from __future__ import annotations
@@ -48,11 +53,12 @@ VECTOR_COUNT = 4
 
 @dataclass(frozen=True)
 class ExportVector:
-    """A test vector: one configuration, and the true result of each function.
+    """One configuration with its true results.
 
-    `tolerances` and `single_tolerances` are the error bounds in double precision (in eps = 2^-52) and in
-    single precision (in eps = 2^-23). If the code computes a number beyond the range of single precision, no
-    error bound exists, and `single_tolerances` contains 0.0.
+    Attributes:
+        tolerances: Bounds in double precision, in eps.
+        single_tolerances: Bounds in single precision, in eps.
+            Without a bound, the value is 0.0.
     """
 
     inputs: tuple[list[float], ...]
@@ -63,12 +69,12 @@ class ExportVector:
 
 @dataclass(frozen=True)
 class Proof:
-    """The checks of an exported file: test vectors and the comparison with Pinocchio.
+    """Test vectors and comparison with Pinocchio.
 
-    `single_precision_bounds` contains the largest error bound of each quantity in single precision, in
-    multiples of eps * scale. The scale of a number is an upper bound on the sum of the absolute values of its
-    terms. If a number is beyond the range of single precision, the error bound is inf. `lock` contains the
-    value of each locked joint.
+    Attributes:
+        single_precision_bounds: Largest bounds, in eps * scale.
+            Beyond the range of single precision, the bound is inf.
+        lock: Values of locked joints.
     """
 
     sha256: str
@@ -154,10 +160,6 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    """Compare the results of `evaluate` with Pinocchio.
-
-    Raise VerificationError if a difference exceeds the error bound.
-    """
     # The user's certificate must not include these checks.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
@@ -176,7 +178,7 @@ def _make_vectors(
     reference: Reference,
     functions: Sequence[Function],
 ) -> tuple[tuple[ExportVector, ...], dict[str, float]]:
-    """Return the test vectors, and the largest bound of each quantity in single precision."""
+    """Return test vectors and single-precision bounds."""
     tree = verifier.tree
     link = tree.frame_link(frame)
     samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_special=False)
@@ -215,9 +217,9 @@ def _make_vectors(
 def _find_tolerances(
     function: Function, part: CallPart, errors: DecimalErrors
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds of a function's results, in eps, and the scales of these results.
+    """Return error bounds and scales.
 
-    Both arrays have the shape (n, numbers). Each error bound is a factor k times the scale of the result.
+    Both shapes are (n, numbers). The bounds are in eps.
     """
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
@@ -229,7 +231,10 @@ def _find_tolerances(
 
 
 def format_decimal(x: Number) -> str:
-    """Return an interval as a decimal number of up to fifty digits; "0.0" if the interval contains 0."""
+    """Return an interval as decimal text.
+
+    An interval that contains 0 becomes "0.0".
+    """
     ball = as_interval(x)
     if ball.contains(0):
         return "0.0"
@@ -245,7 +250,7 @@ def _round_down(x: float) -> str:
 def _round_up(x: float) -> str:
     """Round a bound up.
 
-    A bound must not become smaller, because the rounding error of a constant can be as large as the bound.
+    The rounding error of a constant can be as large as the bound.
     """
     return _round(x, 7, ROUND_CEILING)
 

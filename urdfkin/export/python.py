@@ -25,15 +25,11 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
-        result: Function that yields the lines of code that return the results.
-        imports: Import lines. `{}` is a placeholder for the names of the functions that the code uses.
-            Possible names are `cos`, `sin` and `sqrt`. A line with `{}` is left out if the code uses none of
-            these functions.
-        values: Body of the exported function `_values`. This function returns the results of another function
-            for several configurations.
-        index: Pattern for one number of an input, such as `q[0]`.
-        check_parameter: Parameter of the exported function `check`, with the parameter's default; "" for
-            none.
+        result: Yields the lines that return the results.
+        imports: Import lines. `{}` stands for functions such as `cos`.
+        values: Body of the exported function `_values`.
+        index: Pattern of an input's number, such as `q[0]`.
+        check_parameter: Parameter of the exported `check`.
     """
 
     about: str
@@ -56,7 +52,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`. The exported code assigns each number to an array element."""
+    """Make a `result` that fills arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -69,7 +65,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`. The exported code returns a matrix.
+    """Make a `result` that returns matrices.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -104,7 +100,10 @@ def _numpy_first_lines(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return a line of code that creates zeros with the inputs' batch shape, type and device."""
+    """Make code that creates zeros.
+
+    The zeros have the inputs' batch shape, type and device.
+    """
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
@@ -117,10 +116,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Return a function for `Dialect.first_lines`.
-
-    The exported code computes one configuration, and checks the number of entries of q, v and a.
-    """
+    """Make `Dialect.first_lines` that check lengths."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -138,10 +134,9 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function for `Dialect.result`.
+    """Make a `result` that stacks numbers.
 
-    The exported code combines all numbers into a new array with the library's function `stack`. The code does
-    not assign numbers to array elements, because arrays may be immutable (JAX).
+    Arrays may be immutable, as in JAX.
     """
 
     def result(writer: Writer) -> Iterator[str]:
@@ -188,11 +183,10 @@ _IS_ARRAY = """    if not {is_array}:
 def _make_check(
     wrong: str, given: str = "", numbers: str = "a floating type", array: str = "an array", is_array: str = ""
 ) -> str:
-    """Return the code of the function `_demand`, which checks an input.
+    """Return code of the function `_demand`.
 
-    The arguments `wrong` and `is_array` are Python expressions as text. `wrong` is true for numbers of a
-    wrong type. `is_array` is true for an accepted container. If `is_array` is empty, `_demand` accepts
-    every container. `given` contains further parameters of `_demand`.
+    `wrong` and `is_array` are Python expressions. An empty `is_array` accepts every container. `given`
+    contains further parameters.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -254,18 +248,20 @@ def _torch_module(code: FrameCode) -> str:
 
 
 def _rotation_bound(plan: CompiledTree) -> float:
-    """Return a bound on the angle (rad) by which a vector rotates if one coordinate changes by 1 rad.
+    """Return the bound r.
 
-    Several revolute joints can depend on the same coordinate by mimic rules. For each coordinate, the
-    function adds the absolute values of these joints' multipliers. The bound is the largest sum, or 1 if
-    the largest sum is below 1.
+        r >= angle (rad) by which a vector rotates if one coordinate changes by 1 rad
+        s: sum of |multiplier| over the revolute joints of one coordinate (mimic rules)
+        r = max(1, largest s)
+        with a floating joint: r = max(3, largest s)
 
-    With a floating joint, the bound is at least 3. If one component of a unit quaternion changes by t, the
-    body rotates about a fixed axis. The quaternion is a vector in four dimensions. The changed component
-    belongs to one of the four coordinate axes. Let x be the angle between the quaternion and this coordinate
-    axis. At t = 0, the first three derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x
-    and 4 sin 3x. A product of F rotated unit vectors has a third derivative of at most
-    (2 F)^3 + 3 (2 F)(2 F) + 4 F. This number is at most (3 F)^3.
+    Derivation of 3: if one component of a unit quaternion changes by t, the body rotates about a fixed axis.
+
+        x: angle between the quaternion and the component's coordinate axis, in four dimensions
+        first three derivatives of the rotation angle at t = 0: 2 sin x, -2 sin 2x, 4 sin 3x
+        third derivative of a product of F rotated unit vectors
+            <= (2 F)^3 + 3 (2 F)(2 F) + 4 F
+            <= (3 F)^3
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
@@ -417,7 +413,7 @@ DIALECTS = {
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return a Python module with a function for each quantity, and a check (`python FILE`)."""
+    """Return a module with a check."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [

@@ -1,13 +1,16 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-At each joint, the recursion translates along the rigid link and applies a constant rotation. Then the
-recursion applies the motion of the joint about or along z. Placements and Jacobians are computed in the axes
-of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's
-frame, where joint axes are (0, 0, 1) and link vectors are constant. For the reference LOCAL_WORLD_ALIGNED,
-the results are then transformed to the axes of the world frame. All rotations along the path are applied to
-the results one after another. These rotations need a third fewer operations than the computation of the
-frame's rotation matrix R. For the reference WORLD, velocities and accelerations are computed in the axes of
-the world frame.
+At each joint, the recursion translates along the rigid link, and applies a constant rotation and the joint's
+motion about or along z.
+
+| Quantity | Axes of the vectors |
+|---|---|
+| placement, Jacobian | world, as in the textbook |
+| velocity, acceleration for WORLD | world |
+| other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
+
+For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to the results one after another. These
+rotations need a third fewer operations than the frame's rotation matrix R.
 """
 
 from __future__ import annotations
@@ -26,12 +29,13 @@ _Z: Vector = (0, 0, 1)
 
 @dataclass(frozen=True)
 class NumberKind:
-    """The functions that the recursion needs for one type of number.
+    """Functions for one type of number.
 
-    `chapter` contains the textbook's equations. The recursion calls `begin_step` before each joint, before
-    the final frame and before the results. The recursion calls `end_step` after each joint and after the
-    final frame. The integer argument of `begin_step` and `end_step` is the index of the step. The first joint
-    has the index 0.
+    Attributes:
+        chapter: The textbook's equations.
+        begin_step: Called before each joint, the frame and the results.
+        end_step: Called after each joint and the frame.
+            Both functions receive the index of the step.
     """
 
     chapter: Any
@@ -42,11 +46,13 @@ class NumberKind:
 
 
 class TreeRecursion(Recursion):
-    """The forward recursion along one path; `end` is the state of the frame.
+    """The forward recursion along one path.
 
-    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. If `own_axes`
-    is False, the motion is computed in the axes of the world frame. An input that is not needed consists of
-    zeros. `turns` are rotation matrices from the axes of each frame to the axes of the previous frame.
+    Attributes:
+        inputs: Numbers q, v and a; zeros if unused.
+        own_axes: Whether vectors use each link's own axes.
+        turns: Rotation matrices from each frame to the previous frame.
+        end: State of the frame.
     """
 
     def __init__(
@@ -123,11 +129,10 @@ class TreeRecursion(Recursion):
 
 
 def _without_rounding(x: Sequence[float]) -> Vector:
-    """Return a constant vector, with 0 for entries below the rounding error of the largest entry.
+    """Replace entries below the rounding error by 0.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17. Products with such numbers would make the
-    exported code longer. The error bounds of `urdfkin.kinematics.roundings` include the error of this
-    replacement.
+    Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
+    `urdfkin.kinematics.roundings` include this replacement.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -146,34 +151,33 @@ def placement(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Refe
 
 
 def velocity(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the velocity [linear; angular] of the frame (7.127, 7.128)."""
+    """Return the velocity [linear; angular] (7.127, 7.128)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.velocity(path.end, reference))
 
 
 def acceleration(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the classical acceleration [linear; angular] of the frame (7.129, 7.130)."""
+    """Return the classical acceleration [linear; angular] (7.129, 7.130)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.acceleration(path.end, reference))
 
 
 def jacobian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the numbers of the frame's Jacobian (7.85), row by row."""
+    """Return the Jacobian row by row (7.85)."""
     path = TreeRecursion(plan, kind, inputs, own_axes=False)
     return _by_row(path.jacobian(path.end, path.columns, plan.nv, reference))
 
 
 def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the numbers of the Jacobian's time derivative (7.126), row by row."""
+    """Return the Jacobian's time derivative row by row (7.126)."""
     path = TreeRecursion(plan, kind, inputs, own_axes=False)
     return _by_row(path.jacobian_rate(path.end, path.columns, plan.nv, reference))
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the numbers of the Hessian, row by row.
+    """Return the Hessian row by row.
 
-    The Hessian contains the derivative of each Jacobian column with respect to each coordinate. The sum
-    of these derivatives times the joint velocities is the Jacobian's time derivative (7.126).
+    The Hessian contains the terms of (7.126) before their sum.
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)

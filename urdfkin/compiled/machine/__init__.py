@@ -1,10 +1,8 @@
 """The modules that need Numba: number types, kernels, and the cache of kernels.
 
-Numba reads settings from a file `.numba_config.yaml` in the current folder, during its import and before each
-compilation. One of these settings is the folder of Numba's cache, and Numba executes the files in the cache.
-A malicious settings file in the current folder could therefore run any code. This package makes Numba ignore
-the settings file and read only environment variables. Numba still reads the settings file if a program
-imports Numba before this package.
+Numba reads settings from a file `.numba_config.yaml` in the current folder. The file can select a cache
+folder, and Numba executes the files in the cache. This package makes Numba read only environment variables,
+unless a program imports Numba first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The textbook's equations as compiled functions; Numba compiles them for each type of argument."""
+"""The textbook's equations, compiled by Numba for each type of argument."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """Compile kernels with Numba and cache them on disk.
 
-The name of the cache folder contains a digest of all source files of `compiled` and `kinematics`. A kernel
-may use functions of any of these files. Numba's own cache files have no digest: a truncated file makes every
-later run fail, and Numba executes a file with a changed bit. This module therefore writes a digest into each
-cache file. If a cache file is damaged, its kernel is compiled again.
+The cache folder's name contains a digest of all sources of `compiled` and `kinematics`. Each cache file
+contains a digest of its content. If a cache file is damaged, its kernel is compiled again. Numba itself
+executes cache files with changed bits.
 """
 
 from __future__ import annotations
@@ -39,10 +38,9 @@ _dumps: Any = dumps
 
 
 class KernelCache(_NullCache):  # type: ignore[misc]
-    """The disk cache of one function, which Numba reads before a compilation and writes afterwards.
+    """The disk cache of one function.
 
-    A function's source file may be in another package. The name of the cache file therefore also depends on
-    the text of the function's source file.
+    The key contains the source text, because the source may be in another package.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
@@ -85,7 +83,7 @@ _register: Any = register_pass
 
 class _InlinedLibrary(_Library):  # type: ignore[misc]
     def finalize(self) -> None:
-        """Mark the library as complete, but generate no machine code."""
+        """Complete the library without machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -99,7 +97,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
     _name = "inlined_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        """Translate the function to LLVM code, but not to machine code."""
+        """Translate to LLVM code only."""
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
@@ -114,10 +112,9 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 
 
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler of functions that only kernels call.
+    """Compiles functions that only kernels call.
 
-    The compiler produces LLVM code, but no machine code. The functions must not contain closures or array
-    expressions, because this compiler omits Numba's passes for closures and for array expressions.
+    Closures and array expressions are not supported.
     """
 
     def define_pipelines(self) -> list[Any]:
@@ -159,7 +156,10 @@ _INLINED: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """Ignore NUMBA_DISABLE_JIT, because Python cannot run these functions without compilation."""
+    """Ignore NUMBA_DISABLE_JIT in a `with` block.
+
+    Python cannot run these functions uncompiled.
+    """
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -168,10 +168,7 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Skip Numba's check that linear algebra is available, because the check imports SciPy.
-
-    For other compiled functions that call linear algebra, Numba still imports and checks SciPy.
-    """
+    """Skip Numba's BLAS check, which imports SciPy."""
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
     with suppress(ImportError, AttributeError):
@@ -204,7 +201,7 @@ WRITABLE_FLOATS_3D = types.Array(types.float64, 3, "C")
 
 
 class Kernel:
-    """A function that is compiled, or read from disk, when it is first called."""
+    """A function compiled at first call."""
 
     compiled_function: Any
 
@@ -242,9 +239,9 @@ class Kernel:
 
 
 class CKernel(Kernel):
-    """A compiled function with integer arguments that C code can call.
+    """A compiled function that C code can call.
 
-    A call from Python releases the global interpreter lock, because the call uses ctypes.
+    All arguments are integers. Calls release the global interpreter lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -268,5 +265,5 @@ def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for kernels whose arguments have these Numba types."""
+    """Return a decorator that makes kernels."""
     return lambda function: Kernel(function, arguments)

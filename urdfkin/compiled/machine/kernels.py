@@ -1,7 +1,7 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
-A kernel computes eight configurations at a time, one in each of the eight lanes of a vector register. A
-single configuration is computed in all eight lanes, so its result is exactly the same as in a batch.
+A kernel computes eight configurations at a time, one in each lane of a vector register. A single
+configuration is computed in all eight lanes, so its result is exactly the same as in a batch.
 """
 
 from __future__ import annotations

@@ -83,9 +83,9 @@ def broadcast(context: Any, x: Any) -> Any:
 
 @intrinsic
 def array_data(context: Any, array: Any) -> Any:
-    """Return a pointer to an array's numbers.
+    """Return a pointer to the numbers.
 
-    An index into the pointer must not be negative.
+    Indices must not be negative.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -122,7 +122,7 @@ def _slice_vector(builder: Any, vector: Any, start: int, width: int) -> Any:
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
     """Concatenate vectors of equal length.
 
-    The number of vectors must be a power of two.
+    The count must be a power of two.
     """
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
@@ -132,11 +132,9 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Divide a matrix into square blocks, and transpose each block.
+    """Transpose each square block.
 
-    `vectors` are the rows of the matrix. The number of rows is a power of two. Blocks of 2 by 2 numbers are
-    transposed first. To transpose a larger block, the function exchanges the block's upper right quarter with
-    the lower left quarter.
+    The number of rows must be a power of two.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -155,7 +153,7 @@ def _add_constant(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Return a function that reads `width` numbers of each of eight configurations into scratch rows."""
+    """Make a reader of `width` numbers."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -176,7 +174,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that writes `width` scratch rows of eight configurations to an array."""
+    """Make a writer of `width` numbers."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -204,10 +202,10 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @inline
 def read_rows(m, x, at, stride, count, s, row):
-    """Read `count` numbers of each of eight configurations into rows of scratch memory.
+    """Read numbers into scratch rows.
 
-    The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, the numbers of the first
-    configuration are used for all eight configurations.
+    The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, one configuration fills all
+    lanes.
     """
     i = 0
     if m == 1:
@@ -229,9 +227,9 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @inline
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Copy `count` rows of scratch memory to the array `to`.
+    """Copy scratch rows to an array.
 
-    If `m` is 1, the function copies only the numbers of one configuration.
+    If `m` is 1, only one configuration is copied.
     """
     i = 0
     if m == 1:
@@ -253,7 +251,7 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @intrinsic
 def _prefetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the cache line of `x[at]` into the cache.
+    """Load the cache line of `x[at]`.
 
     An address beyond the array causes no error.
     """
@@ -299,7 +297,7 @@ def _add_eight_squares(total, x, at):
 
 @inline
 def add_squares(total, x, at, count):
-    """Add to `total` the squares of `count` numbers that begin at `x[at]`.
+    """Add `count` squares to `total`.
 
     The last numbers may be added eight times. The total is compared only with a very large bound.
     """
@@ -337,7 +335,10 @@ def is_in_range(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy the eight numbers that begin at `x[i]` to the cache line at `to[at]`, bypassing the caches."""
+    """Copy eight numbers, bypassing the caches.
+
+    `to[at]` must begin a cache line.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
@@ -351,11 +352,9 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy the first `count` numbers of `x` to `to[at]` and the following elements.
+    """Copy numbers, bypassing the caches.
 
-    Whole cache lines are written to memory directly, not to the caches. Before a write of a part of a cache
-    line, the processor must read the line. A write of a whole line needs no read. `address` is the address of
-    `to[0]`.
+    Writes of whole cache lines need no read. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES
@@ -369,7 +368,7 @@ def stream(x, count, to, at, address):
 
 @intrinsic
 def wait_for_writes(context: Any) -> Any:
-    """Wait until the copied cache lines are in memory, so that other processors can read them."""
+    """Make copies visible to other processors."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.fence("seq_cst")

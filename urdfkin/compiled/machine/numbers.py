@@ -1,14 +1,18 @@
 """Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
-A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
-double. A product x y is stored as two factors, and the factors are multiplied only when the product is
-needed. In the sum x y + z, the product and the sum are one fused multiply-add, which is rounded only once.
-This module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)`
-are therefore exactly the same doubles, on every machine.
+| Type or function | Value |
+|---|---|
+| `Lanes(1)` | one double |
+| `Lanes(8)` | eight doubles in one vector register |
+| `Product` | two factors, multiplied only when the product is needed |
+| `zero()`, `one()` | 0 and 1, known at compile time |
+| `unused()` | placeholder for a number that is not needed |
 
-`zero()` and `one()` are the numbers 0 and 1, known at compile time. `unused()` is the placeholder for a
-number that is not needed; each operation with `unused()` gives `unused()`. Operations with these constants
-are simplified at compile time.
+In the sum x y + z, the product and the sum are one fused multiply-add, which is rounded only once. This
+module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are
+therefore exactly the same doubles, on every machine.
+
+Each operation with `unused()` gives `unused()`. Operations with constants are simplified at compile time.
 """
 
 from __future__ import annotations
@@ -41,8 +45,6 @@ class Lanes(types.Type):
 
 
 class Product(types.Type):
-    """The type of a product that is stored as its two factors."""
-
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Product({width})")
@@ -52,7 +54,7 @@ class Product(types.Type):
 
 
 class ConstantNumber(types.Type):
-    """The type of a compile-time constant: 0, 1, or None for the placeholder `unused()`."""
+    """A compile-time constant: 0, 1, or None for `unused()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value
@@ -84,7 +86,7 @@ class _ConstantNumberModel(models.OpaqueModel):
 
 
 class _Value:
-    """A number in code that is being compiled: its Numba type and its LLVM value."""
+    """A typed value in LLVM code."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
@@ -131,10 +133,6 @@ def _is_constant(kind: Any, value: int | None) -> bool:
 
 
 def _are_supported(*kinds: Any) -> bool:
-    """Return whether this module supports an operation on these types.
-
-    At least one type must be a number type of this module. The other types may also be integer types.
-    """
     ours = [isinstance(kind, Lanes | Product | ConstantNumber) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -217,7 +215,10 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number as an LLVM vector; the placeholder `unused()` is not allowed."""
+    """Return a number as an LLVM vector.
+
+    `unused()` is not allowed.
+    """
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -231,7 +232,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
 
 
 def _lower_sum(*, negative: bool) -> Callable[..., Any]:
-    """Return the function that generates the code for x + y, or for x - y if `negative` is true."""
+    """Generate code for sums or differences."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def apply_sign(value: Any) -> Any:

@@ -1,12 +1,18 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the difference is in [-pi/4,
-pi/4]. The code also computes the rounding error of this subtraction. The polynomials come from fdlibm (Sun
-Microsystems, k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the method subtracts multiples of two
-doubles whose sum is nearly pi/2. Two doubles are enough because the subtraction uses fused multiply-adds.
-Near a multiple of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27.
-The C library computes the sine and the cosine of larger angles. Only the larger angles of a vector use the C
-library. The result of a configuration therefore does not depend on the other configurations in the vector.
+| Angle x | Method |
+|---|---|
+| below 2^20 quarter turns | Cody and Waite, with fdlibm's polynomials (Sun, k_sin.c and k_cos.c) |
+| larger | the C library, for only the larger angles of a vector |
+
+Cody and Waite's method, with n quarter turns:
+
+    PI_2 + PI_2_REST: nearly pi/2; two doubles are enough because of fused multiply-adds
+    r = x - n PI_2 - n PI_2_REST, in [-pi/4, pi/4]
+    r_error: rounding error of r
+    error of a sine or cosine near 0 <= 1e-27
+
+The result of a configuration does not depend on the other configurations in the vector.
 """
 
 from __future__ import annotations
@@ -29,9 +35,9 @@ _2_PI = 2.0 / math.pi
 
 @inline
 def sine_cosine(s, row, x):
-    """Return the sines and the cosines of angles.
+    """Return sines and cosines of angles.
 
-    If an angle is nan or very large, the function overwrites the row `row` of scratch memory.
+    If an angle is nan or large, scratch row `row` is overwritten.
     """
     sine, cosine = _small_sine_cosine(x)
     if _any_large(x):
@@ -45,7 +51,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _small_sine_cosine(context: Any, x: Any) -> Any:
-    """Return the sines and cosines of angles below 2^20 quarter turns, without a branch."""
+    """Return sines and cosines below `LARGEST_ANGLE`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -109,7 +115,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Return whether a vector contains nan, or an angle x with |x| of at least 2^20 quarter turns."""
+    """Detect nan and large angles."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments

@@ -1,15 +1,19 @@
 """Make compiled functions that compute a quantity for one configuration.
 
-Python calls a compiled function like a built-in function. In a call through Numba, checking the arguments
-would take as long as the recursion itself. CPython passes the addresses of the arguments to a built-in
-function, and does not check the arguments. The compiled function reads a few 8-byte words of each array
-object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
-interpreter lock for about a microsecond. For unsupported arguments, the function returns None.
+Python calls a compiled function like a built-in function: CPython passes the arguments' addresses without a
+check. Checking the arguments in Numba would take as long as the recursion itself. The compiled function reads
+8-byte words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function
+holds Python's global interpreter lock for about a microsecond.
 
-The compiled function sets a flag before using scratch memory, and clears the flag afterwards. One atomic
-operation sets the flag, so the flag is safe even in a Python without a global interpreter lock. If another
-thread is using the scratch memory, the compiled function also returns None. The caller then computes the
-result in another way.
+An atomic flag protects the scratch memory, even in a Python without a global interpreter lock.
+
+| Situation | Result |
+|---|---|
+| unsupported arguments | None |
+| an input is nan, infinite or too large | None |
+| another thread is using the scratch memory | None |
+
+After None, the caller computes the result in another way.
 """
 
 from __future__ import annotations
@@ -86,7 +90,11 @@ def _call(context: Any, address: Any, argument: Any) -> Any:
 
 @intrinsic
 def _test_and_set(context: Any, numbers: Any, place: Any) -> Any:
-    """Write 1 to `numbers[place]` and return the previous value, in one atomic operation."""
+    """Atomically replace `numbers[place]` by 1.
+
+    Returns:
+        The previous value.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         one = ir.Constant(ir.IntType(64), 1)
@@ -107,10 +115,9 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @inline
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
-    """Return the address of the doubles of an array, or 0 if the object `array` is not as expected.
+    """Return the address of the doubles.
 
-    The object must be a NumPy array of doubles with the flags `flags` and `axes` axes. The first axis must
-    have the length `rows`, and each other axis must have the length `columns`.
+    The address is 0 for unsupported arrays. The first axis has the length `rows`, each other axis `columns`.
     """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
@@ -126,17 +133,18 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 
 @CKernel
 def one_configuration(bound, arguments, count):
-    """Compute the result for one configuration; return None if the arguments are not supported.
+    """Compute the result for one configuration.
 
-    The function also returns None if another thread is using the scratch memory, or if an input is nan,
-    infinite or too large. `arguments` is the address of `count` arguments. The first arguments are q, or q
-    and v, or q, v and a. The last argument is the output array or None. `bound` is the address of a tuple
-    with these items:
+    `arguments` is the address of inputs and output array. `bound` is the address of a tuple:
 
-    - Item 0 is the array of kernel arguments.
-    - Item 1 is NumPy's type of arrays, and item 2 is None.
-    - Item 3 is the function that creates the result array, and item 4 is the shape of this array.
-    - The other items are objects that must stay alive as long as the compiled function.
+    | Item of `bound` | Object |
+    |---|---|
+    | 0 | array of kernel arguments |
+    | 1 | NumPy's type of arrays |
+    | 2 | None |
+    | 3 | function that creates the result array |
+    | 4 | shape of the result array |
+    | others | objects that must stay alive as long as the compiled function |
     """
     items, inputs = integers_at(bound), integers_at(arguments)
     address, ndarray, none = integers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -156,7 +164,11 @@ def one_configuration(bound, arguments, count):
 
 @inline
 def _compute_into(address, inputs, to, ndarray):
-    """Write the kernel's result into the array `to`; return whether the result is valid."""
+    """Write the result to `to`.
+
+    Returns:
+        Whether the result is valid.
+    """
     args = integers_at(address)
     orders, rows, columns, width = args[_ORDERS], args[_ROWS], args[_COLUMNS], args[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, args[_AXES], rows, columns)
@@ -193,7 +205,10 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Return a Python function that runs the code at an address and keeps `bound` alive."""
+    """Make a function from machine code.
+
+    The function keeps `bound` alive.
+    """
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -202,7 +217,7 @@ def _make_builtin(name: str, address: int, *bound: object) -> Callable[..., Floa
 
 @cache
 def array_layout_is_known() -> bool:
-    """Return whether NumPy's arrays have the memory layout that `make_single_evaluator` uses."""
+    """Return whether NumPy's arrays have the expected layout."""
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -232,10 +247,9 @@ _KERNELS: dict[str, tuple[CKernel, CKernel, int, int]] = {
 def make_single_evaluator(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that computes a quantity for one configuration, and the array of kernel arguments.
+    """Make a function for one configuration.
 
-    The compiled tree must have only one frame, and the base must be fixed. The returned function returns None
-    for unsupported arguments. The element `KernelArgs.COUNT` of the array is the number of computed results.
+    The tree must have one frame and a fixed base. The array contains the kernel's arguments.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
@@ -253,9 +267,9 @@ def make_single_evaluator(
 def wrap_c_function(
     c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that calls the C function `c_function` instead of a kernel.
+    """Make a function that calls C.
 
-    Also return the array of the C function's arguments.
+    The array contains the C arguments.
     """
     address = ctypes.cast(c_function, ctypes.c_void_p).value
     return _make_evaluator(address or 0, orders, shape, plan, c_function)

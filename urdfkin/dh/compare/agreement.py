@@ -1,4 +1,4 @@
-"""Compare a URDF with a published table: compare the cells, and compute the error of the tip's pose."""
+"""Compare the cells and the tip's pose of a published table with a URDF."""
 
 from __future__ import annotations
 
@@ -66,11 +66,10 @@ def compare(
     fit: bool = True,
     half_digits: HalfDigits = (),
 ) -> TableComparison:
-    """Compare a reference table with a path of a URDF; `tolerance` is the tolerance at the tip (metres).
+    """Compare a table with a path.
 
-    The table may have other base and tip frames than the path. The table's base frame must be fixed to the
-    path's base link, and the table's tip frame must be fixed to the path's tip link. If `fit` is true, base,
-    tool, joint offsets and joint signs are fitted before the comparison.
+    Base and tip frames may differ by constant poses. `tolerance` (m) applies at the tip. With `fit`, base,
+    tool, joint offsets and signs are fitted first.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -124,9 +123,9 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
-    """Return the largest tip error on samples (metres, radians) after a fast fit.
+    """Fit fast and return tip errors.
 
-    The fit stops at a tip error of at most `target_error` (metres).
+    Units: m and rad. The fit stops at a tip error of `target_error` (m).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -135,11 +134,9 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach (metres).
+    """Return the robot's reach, m.
 
-    A comparison multiplies angles by the reach, so that angles and lengths are comparable. The path length of
-    a URDF can be far larger than the reach. For example, a URDF made from a table without Hayati rows may
-    contain offsets of kilometres.
+    A URDF made from a table without Hayati rows may contain kilometre offsets.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -149,7 +146,6 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Raise InputError if the joint kinds of table and path differ, or if both have no joints."""
     in_table, in_urdf = (
         "".join("R" if item.kind.turns else "P" for item in items) for items in (reference.rows, chain.joints)
     )
@@ -164,10 +160,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the tip's poses for a fit, and the tip's poses for a check of the fit.
-
-    The two sets of poses have different random joint values.
-    """
+    """Sample poses for fit and check."""
     values, poses = _sample_poses(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(
@@ -176,9 +169,9 @@ def _sample_targets(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return random joint values (count, n), and the tip's pose for each sample.
+    """Return joint values and tip poses.
 
-    Mimic rules are ignored, so every joint moves independently.
+    Mimic joints move independently.
     """
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
@@ -188,7 +181,7 @@ def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray,
 
 
 def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
-    """Return the range (m) of each prismatic joint."""
+    """Return prismatic joints' ranges, m."""
     return {
         joint.name: axis_range(joint.kind, joint.limit if has_range(joint.limit) else None)
         for joint in chain.joints
@@ -210,19 +203,19 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains the cell `cell` of row i of the standard table.
+    """Find the reference row of a standard cell.
 
-    In a modified table, row i + 1 contains the cells a, alpha and beta of row i of the standard table. Return
-    None if the modified table has no row i + 1.
+    In a modified table, row i + 1 contains a, alpha and beta. None without such a row.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
 
 
 def _cell_mask(reference: DHTable) -> FloatArray:
-    """Return an (n, 5) array with a number for each cell of the standard rows.
+    """Mark cells that the reference contains.
 
-    The number is 1 if the reference table contains the cell, and 0 otherwise.
+    Returns:
+        (n, 5) ones and zeros.
     """
     rows = range(len(reference.rows))
     return np.array(
@@ -233,9 +226,10 @@ def _cell_mask(reference: DHTable) -> FloatArray:
 def _find_hidden_cells(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each hidden cell.
+    """Find the cells whose errors a fit hides.
 
-    A fit of base, tool and joint offsets can compensate an error of a hidden cell.
+    Returns:
+        Row index and name.
     """
     hidden = []
     for i, k in find_hidden_cells(fitted, check_targets):
@@ -258,10 +252,7 @@ def _find_differences(
     half_digits: HalfDigits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ by more than rounding errors.
-
-    The cells are in descending order of their effect on the tip.
-    """
+    """Return differing cells, largest effect first."""
     by_cells, scale = tip_derivatives(fitted, check_targets)[2], check_targets.scale
     linear = by_cells.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
     largest = np.linalg.norm(linear, axis=1).max(axis=0)
@@ -295,9 +286,9 @@ def _find_differences_without_fit(
     check_targets: TargetPoses,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that must change so that the unfitted table agrees with the URDF.
+    """Find the cells to change instead of a fit.
 
-    The result is empty if a tip error remains after these changes.
+    Empty if a tip error remains.
     """
     corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
@@ -318,10 +309,10 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Return an upper bound of a table's tip error (metres, radians) for all joint values.
+    """Bound the tip error for all joint values.
 
-    The bound does not include rounding errors, and mimic rules are ignored. Each prismatic joint is assumed
-    to be within its limits, or within `ASSUMED_LIMIT` of zero if `has_range` is false for the limits.
+    Units: m and rad. The bounds exclude rounding errors. Mimic rules are ignored. Prismatic joints without a
+    range stay within `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -332,7 +323,10 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path to a tree without mimic rules; the tree's links have the names of the table's links."""
+    """Convert a path, ignoring mimic rules.
+
+    Links have the table's names.
+    """
     travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:

@@ -1,15 +1,17 @@
 """Fit a reference table to the URDF.
 
-The first fit changes the free parameters: base, tool and joint offsets. The second fit also changes cells,
-but as few cells as possible. The tip's error at each sampled configuration is a twist. The tip's motion due
-to a small change of a parameter or a cell is a twist too. The fit uses least squares to find changes whose
-twists cancel the error. Often, changes of different cells cancel the same error. The second fit therefore
-uses reweighted least squares, which change as few cells as possible.
+| Fit | Changed numbers |
+|---|---|
+| first | free parameters: base, tool and joint offsets |
+| second | free parameters, and as few cells as possible |
 
-Suppose that the axes of two joints nearly coincide. If an angle is added to one joint offset and subtracted
-from the other joint offset, the tip hardly moves. Therefore, a fit changes these two joint offsets slowly.
-When the error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive joints by a
-large angle, and fits again.
+A tip error and the tip's motion due to a small change are twists. Least squares finds changes whose twists
+cancel the error. Changes of different cells can often cancel the same error. The second fit therefore uses
+reweighted least squares, which change few cells.
+
+Opposite offsets of nearly coinciding joints hardly move the tip. A fit therefore changes these offsets
+slowly. When the error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive
+joints by a large angle, and fits again.
 """
 
 from __future__ import annotations
@@ -71,7 +73,13 @@ FAST_SEARCH = (3, 16)
 
 @dataclass(frozen=True)
 class TableArrays:
-    """Numbers of a standard table; the columns of `cells` (n, 5) are theta, d, a, alpha and beta."""
+    """Numbers of a standard table.
+
+    Attributes:
+        cells: (n, 5) theta, d, a, alpha, beta.
+        turns: 1 for a revolute joint.
+        senses: Signs of the joints.
+    """
 
     cells: FloatArray
     turns: FloatArray
@@ -91,21 +99,24 @@ class TableArrays:
 
     @cached_property
     def T_0_first(self) -> FloatArray:
-        """(4, 4) pose of the first revolute joint's frame in frame 0, with all joints at zero."""
+        """Zero pose of the first revolute joint's frame."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
 
     @cached_property
     def T_last_tip(self) -> FloatArray:
-        """(4, 4) pose of the tip in the last revolute joint's frame, with the later joints at zero."""
+        """Pose of the tip in the last revolute joint's frame.
+
+        The later joints are at zero.
+        """
         turning = np.flatnonzero(self.turns)
         begin = len(CELLS) * int(turning[-1] if turning.size else len(self.cells) - 1) + CELLS.index("a")
         return Path((*self._motions[begin:], self.tool)).poses(self.cells.ravel()[begin:])
 
     @cached_property
     def variable_indices(self) -> tuple[int, ...]:
-        """For each row, the index of the cell with the joint's variable: theta or d."""
+        """Cell index of each joint's variable."""
         return tuple(CELLS.index("theta" if turns else "d") for turns in self.turns)
 
     @property
@@ -113,10 +124,9 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the angles (rad) and lengths (m) of the path's motions.
+        """Return the path and motions (s, 5 n).
 
-        The array of angles and lengths has the shape (s, 5 n). `values` (s, n) contains the joint values of s
-        samples.
+        Motions are in rad or m. `values` are (s, n) joint values.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
@@ -130,22 +140,27 @@ class TableArrays:
 
 @dataclass(frozen=True, slots=True)
 class TargetPoses:
-    """Poses of the URDF's tip at the joint `values` (s, n); `scale` (m) converts radians to metres."""
+    """Sampled poses of the URDF's tip.
+
+    Attributes:
+        values: (s, n) joint values.
+        scale: Length that converts radians to metres.
+    """
 
     values: FloatArray
     poses: FloatArray
     scale: float
 
     def largest_errors(self, model: TableArrays) -> tuple[float, float]:
-        """Return the largest errors of a model's tip on the samples, in metres and in radians."""
+        """Return largest errors (m, rad)."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return a twist from each pose of a model to its target pose, as one array of 6 s numbers.
+        """Return the twists to the targets.
 
-        s is the number of poses. The angles are multiplied by `scale`.
+        The shape is (6 s,). Angles are multiplied by `scale`.
         """
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
@@ -154,11 +169,15 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and the poses' derivatives with respect to free parameters and cells.
+    """Return the tip's poses with derivatives.
 
-    The derivatives are twists, in two arrays with the shapes (6 s, 12 + n) and (6 s, 5 n). The free
-    parameters have 6 columns for the base, 6 for the tool, and 1 for each joint offset. Angles are multiplied
-    by the scale.
+    The derivatives are twists. Angles are multiplied by the scale.
+
+    | Result | Shape |
+    |---|---|
+    | poses of s samples | (s, 4, 4) |
+    | twists for base (6), tool (6) and joint offsets (n) | (6 s, 12 + n) |
+    | twists for cells | (6 s, 5 n) |
     """
     scale = targets.scale
     path, amounts = model.path_and_amounts(targets.values)
@@ -175,7 +194,10 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists (6 s, 6) for translations along and rotations about the axes of a frame."""
+    """Return tip twists (6 s, 6).
+
+    The frame moves along or about its own axes.
+    """
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
     twists = np.zeros((len(poses), 6, 6))
@@ -187,7 +209,10 @@ def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatA
 def apply_changes(
     model: TableArrays, free: FloatArray, scale: float, cells: FloatArray | None = None
 ) -> TableArrays:
-    """Return the model after small changes of free parameters and cells; angles are multiplied by `scale`."""
+    """Change free parameters and cells slightly.
+
+    Angles are multiplied by `scale`.
+    """
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
@@ -202,7 +227,7 @@ def apply_changes(
 
 
 def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """Return T after a small translation and rotation, which are expressed in the frame of T."""
+    """Apply a twist in T's frame."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
@@ -210,10 +235,9 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
-    """Fit the table to the targets, and change as few cells as possible.
+    """Fit the table by changing few cells.
 
-    `mask` (n, 5) is 1 for the cells that may change, and 0 for all other cells. If `free` is true, the free
-    parameters are fitted too.
+    `mask` (n, 5) is 1 for allowed changes. With `free`, the free parameters change too.
     """
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
@@ -242,11 +266,9 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return cell changes that remove the tip error.
+    """Remove tip errors by few changes.
 
-    After these changes, as few cells as possible differ from `start`. A cell is not changed if a change of
-    the free parameters has the same effect on the tip. For example, a joint offset has the same effect as the
-    cell theta of a revolute joint.
+    A cell that acts like a free parameter is not changed.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
@@ -270,9 +292,10 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
 
 
 def find_hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of each hidden cell.
+    """Find cells equivalent to free parameters.
 
-    The free parameters can move the tip in the same way as a hidden cell.
+    Returns:
+        Row and cell index.
     """
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
@@ -292,7 +315,10 @@ def fit_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters; stop at a tip error of at most `target_error` (metres)."""
+    """Fit the free parameters.
+
+    The fit stops at a tip error of `target_error` (m).
+    """
     written = TableArrays.of(standard)
 
     def size(model: TableArrays) -> float:
@@ -332,7 +358,7 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 
 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
-    """Yield the written table, then the table with each likely combination of joint signs."""
+    """Yield the table, then likely signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
@@ -344,7 +370,10 @@ def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator
 def fit_free_parameters(
     model: TableArrays, targets: TargetPoses, *, large_angles: bool, only_ends: bool = False
 ) -> TableArrays:
-    """Fit base, tool and joint offsets, or only base and tool if `only_ends` is true."""
+    """Fit base, tool and joint offsets.
+
+    With `only_ends`, joint offsets stay unchanged.
+    """
     for _ in range(2 * len(model.cells)):
         model, size = _least_squares_fit(model, targets, only_ends)
         if not large_angles or size <= _ROUNDING * targets.scale * math.sqrt(6 * len(targets.values)):
@@ -382,9 +411,9 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return models in which the offsets of two consecutive revolute joints have changed by a large angle.
+    """Change consecutive offsets by large angles.
 
-    The two rotations cancel each other if the axes of the joints coincide.
+    Rotations about coinciding axes cancel.
     """
     models = []
     for i in range(len(model.cells) - 1):

@@ -1,10 +1,11 @@
-"""Find another convention, other units or other column names with which a table agrees with a URDF.
+"""Find another convention, other units or other columns with which a table fits a URDF.
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
-robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`find_better_interpretation` ranks the interpretations by a sum of two terms. The first term is the difference
-between the table's shape and the URDF's shape. The second term is a cost for each difference from the
-interpretation that the file states. The function fits at most the three best interpretations.
+robot a different shape: distances, angles and offsets of consecutive axes. `find_better_interpretation` ranks
+the interpretations by a sum, and fits at most the three best:
+
+    difference between the shapes of table and URDF
+    + cost of each difference from the interpretation that the file states
 """
 
 from __future__ import annotations
@@ -50,7 +51,11 @@ _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3
 
 @dataclass(frozen=True, slots=True)
 class BetterInterpretation:
-    """Another interpretation of a table; `metres` and `radians` are the largest tip errors after a fit."""
+    """Another interpretation of a table.
+
+    Attributes:
+        metres, radians: Largest tip errors after a fit.
+    """
 
     interpretation: Interpretation
     stated: Interpretation
@@ -77,12 +82,13 @@ class BetterInterpretation:
 def find_better_interpretation(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
 ) -> BetterInterpretation | None:
-    """Return the interpretation with which a table agrees with a URDF, or None.
+    """Find an interpretation that fits.
 
-    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
-    is the tip error with the interpretation that the file states. The function accepts an interpretation with
-    a tip error of at most `tolerance` (metres). A larger tip error must be at most 5 % of `stated_error` and
-    at most 5 % of the reach.
+    Accepted tip errors:
+
+        error <= max(tolerance, 0.05 min(stated_error, reach))
+
+    `tolerance` and `stated_error` are in metres. `data` comes from `mapping_from_text`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = path_shape(derive(chain, DerivationOptions(last="flange")), chain.reach)
@@ -120,10 +126,9 @@ def find_better_interpretation(
 def find_dh_convention(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Return the convention, standard or modified, with which a table fits a path better.
+    """Find the convention that fits better.
 
-    Raise InputError if both conventions fit equally well. If neither convention fits, other units and other
-    column names are tried before InputError is raised.
+    If neither convention fits, other units and columns are tried.
     """
     comparisons = dict[DHConvention, TableComparison]()
     errors = list[InputError]()
@@ -162,11 +167,14 @@ def find_dh_convention(
 
 
 def path_shape(table: DHTable, scale: float) -> FloatArray:
-    """Return the offset, the distance and the angle of each pair of consecutive axes.
+    """Return offsets, distances and angles between consecutive axes.
 
-    The angles are multiplied by `scale`. Joint signs, joint offsets, base and tool do not change the result.
-    Numbers that depend on free choices are 0: all lengths next to a prismatic axis, and the offset along the
-    first axis of the path.
+    Joint signs, joint offsets, base and tool have no effect. Angles are multiplied by `scale`. Some lengths
+    are 0, because they depend on free choices:
+
+        lengths next to a prismatic axis
+        offset along the first axis
+        offset along parallel axes
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -187,7 +195,11 @@ def path_shape(table: DHTable, scale: float) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Interpretation:
-    """Convention, units, and the true contents of the columns a, alpha, d and theta."""
+    """Convention, units and columns of a table.
+
+    Attributes:
+        columns: True contents of the columns.
+    """
 
     convention: DHConvention | None
     lengths: LengthUnit
@@ -195,10 +207,7 @@ class Interpretation:
     columns: tuple[str, ...] = COLUMNS
 
     def table(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table in this interpretation, without base and tool.
-
-        Raise InputError if the table is not valid in this interpretation.
-        """
+        """Return the table without base and tool."""
         stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         contents = dict(zip(COLUMNS, self.columns, strict=True))
         rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]
@@ -206,14 +215,17 @@ class Interpretation:
         return table_from_mapping({**rest, **stated, "rows": rows})
 
     def difference_count(self, other: Interpretation) -> int:
-        """Return the number of differences; two exchanged columns count as one difference."""
+        """Count the differences between two interpretations.
+
+        Exchanged columns are one difference.
+        """
         columns = sum(
             column != expected for column, expected in zip(self.columns, other.columns, strict=True)
         )
         return len(self._convention_and_units(other)) + (columns + 1) // 2
 
     def differences(self, other: Interpretation) -> str:
-        """Describe the differences from another interpretation, for example "modified, millimetres"."""
+        """Describe differences, such as "modified, millimetres"."""
         names = self._convention_and_units(other)
         if self.columns != other.columns:
             names.append(f"its columns {', '.join(COLUMNS)} as {', '.join(self.columns)}")
@@ -233,9 +245,9 @@ def parse_interpretation(data: Mapping[str, Any]) -> Interpretation:
 
 
 def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretation, DHTable]]:
-    """Yield each other interpretation in which the table is valid, and the table in this interpretation.
+    """Yield other valid interpretations and tables.
 
-    An interpretation with fewer differences from the stated interpretation comes earlier.
+    Interpretations with fewer differences come first.
     """
     rows = data.get("rows")
     if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
@@ -252,7 +264,6 @@ def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretat
 
 
 def find_table_warnings(table: DHTable) -> list[str]:
-    """Return warnings about units or columns that look wrong, each with a remedy."""
     warnings = []
     columns = {name: [getattr(row, name) for row in table.rows if getattr(row, name)] for name in COLUMNS}
     lengths = [abs(length) for length in (*columns["a"], *columns["d"])]

@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
-correction of the sign, a fit changes fewer of these parameters. Some corrected tables need no fit.
+correction of the sign, a fit changes fewer of these parameters.
 """
 
 from __future__ import annotations
@@ -38,7 +38,11 @@ _MAX_FITS = 100
 
 @dataclass(frozen=True, slots=True)
 class _TableCorrection:
-    """A table with one correction; `cell` is None if the correction exchanges rows."""
+    """A table with one correction.
+
+    Attributes:
+        cell: None if rows are reordered.
+    """
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -48,7 +52,11 @@ class _TableCorrection:
 
 @dataclass(frozen=True, slots=True)
 class MistakeSearch:
-    """A search for a single mistake in a table; `tolerance` is the tolerance at the tip (metres)."""
+    """Search for a single mistake.
+
+    Attributes:
+        tolerance: Tolerance at the tip, m.
+    """
 
     chain: FrameChain
     targets: TargetPoses
@@ -56,17 +64,18 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the likeliest mistakes in a table.
+        """Return the likeliest mistakes.
 
-        Each possible mistake is corrected in a copy of `reference`, and the copy is fitted to the URDF. The
-        fit can change base, tool, joint offsets and joint signs. For the likeliest mistakes, the corrected
-        table agrees with the URDF after the fewest changes. If `reference` itself agrees after equally few
-        changes, the result is empty.
+        After the likeliest correction, a fit changes the fewest parameters:
 
-        If `agrees` is true, `reference` agrees with the URDF after a fit. Such a table may be correct,
-        because the author of a table can choose the frames. Then a corrected table must agree without a fit,
-        or after a fit of only the base or only the tool. If `fit` is false, a corrected table must agree
-        without a fit.
+        | Arguments | Allowed fit of the corrected table |
+        |---|---|
+        | `fit` is false | none |
+        | `agrees` is true | only base or only tool |
+        | otherwise | base, tool, joint offsets and joint signs |
+
+        If `agrees` is true, the table may be correct, with other frames. The result is empty if the original
+        table fits equally well.
         """
         if self._without_fit(reference) is not None:
             return ()
@@ -90,7 +99,7 @@ class MistakeSearch:
         return ()
 
     def _needs_one_parameter(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of one parameter: base, tool, a joint offset or a joint sign."""
+        """Whether one fitted parameter is enough."""
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)
@@ -107,7 +116,7 @@ class MistakeSearch:
         return model if self._agrees(model) else None
 
     def _fit_one_end(self, table: DHTable) -> TableArrays | None:
-        """Fit only the tool; if the table then does not agree, fit only the base."""
+        """Fit only the tool, or only the base."""
         model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         with_tool = replace(model, tool=_mean_pose(model.tool @ np.linalg.inv(poses) @ target_poses))
@@ -115,7 +124,6 @@ class MistakeSearch:
         return next((fitted for fitted in (with_tool, with_base) if self._agrees(fitted)), None)
 
     def _fit_both_ends(self, table: DHTable) -> TableArrays | None:
-        """Fit base and tool; the start value of the base is a solution of A X = X B."""
         model = _make_model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         A, B = target_poses @ np.linalg.inv(target_poses[0]), poses @ np.linalg.inv(poses[0])
@@ -127,7 +135,7 @@ class MistakeSearch:
         return fitted if self._agrees(fitted) else None
 
     def _fit_zeros_and_senses(self, table: DHTable) -> TableArrays | None:
-        """Fit base, tool, joint offsets and joint signs; return the fit with the fewest changes."""
+        """Fit all parameters and joint signs."""
         standard, written = to_convention(table, DHConvention.STANDARD), _make_model(table)
         fits = [
             fit_free_parameters(start, self.targets, large_angles=False)
@@ -138,7 +146,6 @@ class MistakeSearch:
         return min(agreeing, key=lambda model: self._find_fit_changes(written, model).count, default=None)
 
     def _find_fit_changes(self, written: TableArrays, model: TableArrays) -> FitChanges:
-        """Return which parameters a fit changed; changes up to the resolution of the fit do not count."""
         metres, radians = self.check_targets.largest_errors(model)
         fine = fit_resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))
@@ -211,14 +218,14 @@ def _replace_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean_pose(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses."""
+    """Average nearly equal poses."""
     mean = poses.mean(axis=0)
     R = polar_factor(mean[:3, :3])
     return pose(R, mean[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])
 
 
 def _solve_hand_eye(A: FloatArray, B: FloatArray) -> FloatArray:
-    """Solve A X = X B for X (4, 4) in least squares over poses (s, 4, 4): Park and Martin (1994)."""
+    """Solve A X = X B: Park and Martin (1994)."""
     turns = log_rotation(A[:, :3, :3]).T @ log_rotation(B[:, :3, :3])
     U, _, Vt = np.linalg.svd(turns)
     R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt

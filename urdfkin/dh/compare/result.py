@@ -34,12 +34,14 @@ _HALF_DIGIT_FACTOR = 1.0 + 1e-6
 
 @dataclass(frozen=True, slots=True)
 class CellDifference:
-    """One cell of a published table that differs from the URDF's value (metres or radians).
+    """A cell that differs from the URDF.
+
+    Values are in m or rad.
 
     Attributes:
-        tip_displacement: Largest displacement (metres) of the tip on the samples if only this cell differs.
-        half_digit: Half a unit of the last digit of `reference`; 0 if the value is exact or its text is
-            unknown.
+        tip_displacement: Largest tip displacement due to this cell, m.
+        half_digit: Half a unit of the last digit of `reference`.
+            Exact or unknown values have 0.
     """
 
     row: int
@@ -68,7 +70,7 @@ class CellDifference:
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """Distance and angle by which the fit moved a table's base or tool."""
+    """Change of base or tool."""
 
     metres: float
     radians: float
@@ -83,10 +85,11 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FitChanges:
-    """The parameters of a table that a fit changes.
+    """The parameters that a fit changes.
 
-    `zeros` is the number of joints with a changed offset. `reversed` is the number of joints with a changed
-    sign.
+    Attributes:
+        zeros: Number of changed joint offsets.
+        reversed: Number of changed joint signs.
     """
 
     base: bool = False
@@ -109,9 +112,10 @@ class FitChanges:
 class Mistake:
     """A likely mistake in a table.
 
-    `table` is the corrected table. `fit_changes` describes the fit of the corrected table. `metres` and
-    `radians` are the tip errors after this fit. To agree with the URDF, the corrected table needs changes of
-    fewer parameters than the original table.
+    Attributes:
+        table: The corrected table.
+        fit_changes: Fit of this table.
+        metres, radians: Tip errors after this fit.
     """
 
     kind: MistakeKind
@@ -128,23 +132,21 @@ class TableComparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
-            offsets. The method `placement` of this table takes the URDF's joint coordinates.
-        travel: Sum (m), over all prismatic joints, of the largest absolute joint value.
-        senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
-            joint value.
-        metres, radians: Largest tip error of the fitted table on the samples.
-        metres_bound, radians_bound: Proven upper bounds of the fitted table's tip error. The bounds hold for
-            all angles, and for all displacements within the joint limits. A prismatic joint without limits is
-            assumed to be within 10 m of zero. The bounds do not include rounding errors.
-        unfitted_metres, unfitted_radians: Largest tip error of the unfitted table on the samples.
-        unfitted_differences: The cells that must change so that the unfitted table agrees with the URDF. The
-            tuple is empty if `mistakes` is not empty, or if `is_fitted` is false. It is also empty if a tip
-            error remains after these changes, or if these cells outnumber the cells in `differences` by more
-            than two.
-        hidden: Row index and name of each hidden cell. A fit of base, tool and joint offsets can compensate
-            for an error in a hidden cell.
-        residual: Tip error (metres) that remains if the differing cells take the URDF's values.
+        reference: Fitted table, with the URDF's joint coordinates.
+        travel: Sum of the prismatic joints' largest absolute values, m.
+        senses: Signs of the joints.
+            The table's variable is sign * q + offset.
+        metres, radians: Largest tip errors on samples.
+        metres_bound, radians_bound: Proven bounds, without rounding errors.
+            Joints stay within their limits.
+            A prismatic joint without limits stays within 10 m of zero.
+        unfitted_metres, unfitted_radians: Tip errors without a fit.
+        unfitted_differences: Cells to change instead of a fit.
+            Empty without a fit, or after a found mistake.
+            Empty if few changes are not enough.
+        hidden: Row index and name.
+            A fit compensates errors of hidden cells.
+        residual: Tip error after cell corrections, m.
     """
 
     reference: DHTable
@@ -171,9 +173,9 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the fitted table's tip error is within `tolerance` on all samples.
+        """Whether the tip error is within `tolerance`.
 
-        An angular error is multiplied by the reach.
+        Angles are multiplied by the reach.
         """
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
@@ -183,61 +185,58 @@ class TableComparison:
 
     @property
     def rounding(self) -> float:
-        """Largest tip error that rounding can cause, in radians, or in metres per metre of reach."""
+        """Largest tip error due to rounding.
+
+        Unit: rad, or m per m of reach.
+        """
         return EPS * fit_roundings(len(self.reference.rows))
 
     @property
     def rounding_metres(self) -> float:
-        """Largest distance (m) between the table's tip and the URDF's tip due to rounding errors.
-
-        The displacements of prismatic joints contribute to the rounding errors.
-        """
+        """Largest rounding error of position, m."""
         return self.rounding * (self.reach + self.travel)
 
     @property
     def resolution(self) -> float:
-        """The power of ten (radians, or metres per metre of reach) to which fitted numbers are rounded."""
+        """Rounding step of fitted numbers.
+
+        The unit is that of `rounding`.
+        """
         return fit_resolution(self.metres / self.reach, self.radians)
 
     @property
     def exact(self) -> bool:
-        """Whether the table is proven to differ from the URDF only by rounding.
+        """Whether table and URDF provably differ only by rounding.
 
-        The proof covers the same joint values as `metres_bound`.
+        The proof covers the joint values of `metres_bound`.
         """
         return self.metres_bound <= self.rounding_metres and self.radians_bound <= self.rounding
 
     @property
     def condition(self) -> str:
-        """The assumption about prismatic joints without limits, as text; empty if there are no such joints.
-
-        A joint counts as a joint without limits if `has_range` is false.
-        """
+        """Assumption about prismatic joints without limits."""
         rows = self.reference.rows
         free = [row.joint for row in rows if not row.kind.turns and not has_range(row.limit)]
         return f"{', '.join(free)} within {ASSUMED_LIMIT:g} m of zero" if free else ""
 
     @property
     def is_exact_unfitted(self) -> bool:
-        """Whether the unfitted table agrees with the URDF on all samples, up to rounding errors."""
+        """Whether rounding explains all unfitted errors."""
         return self.unfitted_metres <= self.rounding_metres and self.unfitted_radians <= self.rounding
 
 
 def has_range(limit: Limit | None) -> bool:
-    """Return whether a prismatic joint's limits are finite and allow more than one value.
+    """Return whether limits are finite and different.
 
-    If the two limits of a joint are equal, a comparison ignores the limits and moves the joint. If the joint
-    did not move, the samples would not depend on the direction of the joint's axis. The default of both
-    limits is 0, so a URDF may omit the limits.
+    A joint without motion does not show the direction of its axis.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
 
 def fit_resolution(relative_error: float, radians: float) -> float:
-    """Return the power of ten to which fitted numbers are rounded.
+    """Return the power of ten for rounding fitted numbers.
 
-    The result is the smallest power of ten that is at least twice the tip error and at least twice
-    `_MIN_TIP_ERROR`. `relative_error` is the position error of the tip in metres per metre of reach.
+    `relative_error` is in m per m of reach.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(relative_error, radians, _MIN_TIP_ERROR))))
 
@@ -420,9 +419,9 @@ def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Round an offset to a multiple of `fine`, and format it.
+    """Round and format an offset.
 
-    An angle that differs by at most `fine` from a multiple of 15 degrees is rounded to this multiple.
+    Nearly exact multiples of 15 degrees become exact.
     """
     if abs(offset) <= fine:
         return "0"

@@ -1,9 +1,15 @@
-"""Find the joint signs and the directions of x with which a reference table fits a path of a URDF.
+"""Find the joint signs and directions of x with which a reference table fits a path.
 
-The author of a table makes three choices that do not change the robot: the positive direction of each joint,
-the direction of x along each common normal, and the zero position of each theta. The search describes each
-direction by a sign, +1 or -1, and computes the zero positions from the signs. Each combination of signs gives
-a table of the path. A beam search keeps the combinations whose tables differ least from the reference table.
+The author of a table makes three choices that do not change the robot:
+
+| Choice | In the search |
+|---|---|
+| positive direction of each joint | sign, +1 or -1 |
+| direction of x along each common normal | sign, +1 or -1 |
+| zero position of each theta | computed from the signs |
+
+Each combination of signs gives a table of the path. A beam search keeps the combinations whose tables differ
+least from the reference table.
 """
 
 from __future__ import annotations
@@ -42,15 +48,14 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class SignFit:
-    """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
+    """A likely combination of joint signs.
 
     Attributes:
-        senses: Sign of each joint. If the sign is -1, the reference's variable decreases while the URDF's
-            joint value increases.
-        offsets: Joint offset of each row (rad or m). The joint offset is added to theta of the reference's
-            row, or to d if the joint is prismatic.
-        base: (4, 4) pose of the reference's frame 0 in the URDF's base.
-        tool: (4, 4) pose of the URDF's tip in the reference's last frame.
+        senses: Signs of the joints.
+            A sign -1 reverses the reference's variable.
+        offsets: Joint offsets, rad or m.
+        base: (4, 4) pose T_base_0.
+        tool: (4, 4) pose T_n_tip.
     """
 
     senses: tuple[int, ...]
@@ -61,17 +66,15 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """An alignment of the first joints of the chain with the first rows of the reference table.
+    """An alignment of the first rows.
 
     Attributes:
-        cost: Weighted sum of the differences between cells, plus the cost of reversed joints (metres). Angles
-            are multiplied by the reach.
-        offsets: Joint offset of each of these joints, except for the last joint. The joint offset of the last
-            joint is not yet known.
-        phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
-        delta_in: Offset along z from the last joint's DH frame to its URDF frame (metres).
-        free_offset: Row index and sign of a joint offset that can be chosen freely, because the direction of
-            x is free. The sign (+1 or -1) is the direction in which x rotates if the joint offset increases.
+        cost: Weighted difference of cells, m.
+        offsets: Joint offsets without the last.
+        phi_in: Rotation about z to the URDF frame, rad.
+        delta_in: Offset along z to the URDF frame, m.
+        free_offset: Row of a free joint offset, and x's direction.
+            The direction is +1 or -1.
     """
 
     cost: float
@@ -86,11 +89,9 @@ class _PartialAlignment:
 def find_sign_fits(
     chain: FrameChain, reference: DHTable, count: int = MAX_PATTERNS, beam_width: int = BEAM_WIDTH
 ) -> list[SignFit]:
-    """Return up to `count` alignments of a path with a standard reference table.
+    """Return the best alignments with a standard table.
 
-    The alignments are in ascending order of their difference from the reference table. The table must have
-    the same kinds of joints as the path. If the path has prismatic joints, several combinations of joint
-    signs may give equal tables. Only a fit can distinguish these combinations.
+    Path and table must have equal joint kinds. With prismatic joints, several results may be equal.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -113,7 +114,10 @@ def find_sign_fits(
 
 
 def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
-    """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
+    """Keep one of several equivalent alignments.
+
+    Equivalent alignments differ by a rotation about coinciding axes.
+    """
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
         # A change of a free joint offset by pi reverses x.
@@ -125,9 +129,9 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
 
 
 def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return the constant pose A_k between two frames.
+    """Return A_k for two joint signs.
 
-    A joint frame with sign -1 is turned by pi about x, so that its z axis is reversed.
+    A sign -1 turns a joint frame by pi about x.
     """
     A = chain.constants[k]
     A = _HALF_TURN @ A if sense_before < 0 else A
@@ -137,10 +141,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Extend an alignment of the joints 0 to i by joint i + 1, in each possible way.
-
-    Each result uses a different transform between the axes of the joints i and i + 1.
-    """
+    """Extend an alignment by each transform."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
@@ -180,9 +181,9 @@ def _free_offset(
 
 
 def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the free joint offset so that the cell theta of the last joint becomes `theta`.
+    """Change the free offset to obtain `theta`.
 
-    The last joint is prismatic. `partial.free_offset` selects the free joint offset.
+    The last joint must be prismatic.
     """
     if partial.free_offset is None:
         return partial
@@ -199,7 +200,6 @@ def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float)
 def _possible_transforms(
     A: FloatArray, row: DHRow, delta: float, reach: float, default_phi: float, both_revolute: bool
 ) -> Iterator[AxisTransform]:
-    """Yield each possible transform between two axes twice, with opposite directions of x."""
     steps = []
     sine = tilt_sine(A)
     near = abs(math.sin(row.alpha)) < MAX_HAYATI_TILT and sine < MAX_HAYATI_TILT

@@ -36,10 +36,9 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
-    """Return the table in a format of `FORMATS`; raise InputError if the format cannot express the table.
+    """Export a table in a format of `FORMATS`.
 
-    `units` applies only to printed tables; data and code are in metres and radians. With `verify`, Pinocchio
-    checks numeric code.
+    Only printed tables use `units`. With `verify`, Pinocchio checks numeric code.
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

@@ -1,8 +1,7 @@
 """Export a table as code for exact symbolic computation, and format names and numbers in code.
 
-`urdfkin.export` writes code that computes with doubles. This module writes code that contains the table's
-rows with exact numbers: pi/2 stays pi/2, and 0.425 becomes 17/40. The Python code uses SymPy. The MATLAB code
-uses the Symbolic Math Toolbox; it also runs in Octave with the package symbolic.
+Numbers are exact: pi/2 stays pi/2, and 0.425 becomes 17/40. The Python code uses SymPy. The MATLAB code uses
+the Symbolic Math Toolbox, or Octave's package symbolic.
 """
 
 from __future__ import annotations
@@ -51,12 +50,12 @@ def header_lines(table: DHTable) -> list[str]:
 
 
 def sanitize(text: str) -> str:
-    """Replace all characters that are not printable ASCII or that could end a comment or a string."""
+    """Replace characters that could end a comment or string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
 def format_numbers(values: FloatArray | list[float]) -> str:
-    """Format numbers so that a parser reads back the same bits."""
+    """Format numbers without loss of bits."""
     return ", ".join(repr(float(value)) for value in values)
 
 
@@ -70,7 +69,7 @@ def check_no_mimic(table: DHTable, what: str) -> None:
 
 
 def format_limits(row: DHRow) -> str:
-    """Return the lower and upper limit, separated by a comma; "" if a limit is infinite."""
+    """Return both limits. Without limits: ""."""
     return format_numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
@@ -85,7 +84,7 @@ _MAX_DENOMINATOR = 10**9
 
 
 class Fractions(Units):
-    """Format angles as multiples of pi, and lengths as fractions (0.425 is 17/40), in the syntax of SymPy."""
+    """Format angles as multiples of pi, lengths as fractions."""
 
     def format_length(self, metres: float) -> str:
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
@@ -151,7 +150,7 @@ def placement(q):
 
 
 def write_sympy(table: DHTable) -> str:
-    """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
+    """Return a SymPy module with `placement(q)`."""
     number, n = Fractions(), len(table.joint_names)
     base, tool = (
         "[" + ", ".join(f"[{', '.join(map(number.format_length, row))}]" for row in T.tolist()) + "]"
@@ -193,7 +192,7 @@ class _Matlab(Fractions):
 
 
 def write_matlab_symbolic(table: DHTable) -> str:
-    """Return a MATLAB file with the function `[T, q] = ROBOT_symbolic()`."""
+    """Return a MATLAB file with `ROBOT_symbolic`."""
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {make_identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header_lines(table)]

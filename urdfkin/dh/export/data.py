@@ -21,10 +21,9 @@ from urdfkin.model.configuration import TRAVEL_CONDITION
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return the table as plain data, in metres and radians.
+    """Return the table as plain data.
 
-    The key `snap` contains the angles that were rounded to multiples of 15 degrees, and bounds of the effect
-    on the tip.
+    Units are metres and radians.
     """
     data: dict[str, Any] = {
         "convention": str(table.convention),
@@ -99,7 +98,7 @@ _CSV_COLUMNS = (
 
 
 def write_csv(table: DHTable) -> str:
-    """Return the table in CSV: comment lines `# key: value`, a line of column names, then the rows."""
+    """Return CSV: comments, column names, rows."""
     data = to_mapping(table)
     rows = data.pop("rows")
     data.pop("snap", None)

@@ -47,7 +47,7 @@ def format_variable(
     name: str = "q{}",
     number: Callable[[float], str] = "{:.10g}".format,
 ) -> str:
-    """Return the joint's variable with its sign and its multiplier, for example q1, -q2 or 2 q1."""
+    """Format a variable, such as -q2."""
     mimicked_joint = row.mimic.mimicked_joint if row.mimic else row.joint
     q = name.format(table.joint_names.index(mimicked_joint) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
@@ -55,9 +55,9 @@ def format_variable(
 
 
 def format_coordinate_names(table: DHTable) -> str:
-    """Return the names of the coordinates as text, such as "with q1 = left, q2 = right".
+    """Return text such as "with q1 = left".
 
-    The text is empty if q1 is the joint of row 1, q2 is the joint of row 2, and so on.
+    Empty if joint i belongs to row i.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
@@ -65,7 +65,7 @@ def format_coordinate_names(table: DHTable) -> str:
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return the numbers that the row's mimic rule adds to the printed theta and to the printed d."""
+    """Return offsets of theta and d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
@@ -115,7 +115,7 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
 
 
 def format_bound(value: float) -> str:
-    """Format an upper bound with three digits; the last digit is rounded up.
+    """Round a bound up to three digits.
 
     >>> format_bound(7.5912e-06), format_bound(0.0)
     ('7.60e-06', '0')
@@ -187,7 +187,10 @@ def write_html(table: DHTable, units: Units) -> str:
 
 
 def write_latex(table: DHTable, units: Units) -> str:
-    """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
+    """Return a LaTeX table environment.
+
+    Required packages: amsmath, booktabs and graphicx.
+    """
     at = "_{i-1}" if table.convention is DHConvention.MODIFIED else "_i"
     angle = "rad" if units.angles is AngleUnit.RADIANS else r"$^\circ$"
     symbols = {"a": f"$a{at}$", "alpha": rf"$\alpha{at}$", "d": "$d_i$", "theta": r"$\theta_i$"}
@@ -222,7 +225,7 @@ def _caption(table: DHTable) -> str:
 
 
 def scale_to_fit(lines: list[str]) -> list[str]:
-    """Return LaTeX code that scales a wide table down to the width of the text."""
+    """Scale a wide LaTeX table to the text width."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 
@@ -238,7 +241,6 @@ def latex_math(text: str) -> str:
 
 
 def _write_powers_of_ten(text: str) -> str:
-    """Write numbers such as 1e-6 as powers of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)
 
 
@@ -247,10 +249,12 @@ def _write_powers_of_ten(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits.
+    """Tip error of a printed table.
 
-    If `unlimited` is true, a prismatic joint has no limits. The error and the bound then assume a travel of
-    at most `ASSUMED_LIMIT`.
+    Attributes:
+        metres: Largest error on the samples.
+        bound: Proven bound within the limits.
+        unlimited: Whether `ASSUMED_LIMIT` replaces missing limits.
     """
 
     digits: int
@@ -269,7 +273,10 @@ class PrintedPrecision:
 
 
 def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Return the tip error of a printed table with `pose_digits` significant digits in base and tool."""
+    """Return a printed table's tip error.
+
+    `pose_digits` applies to base and tool.
+    """
     rows = tuple(_round_row(row, units) for row in table.rows)
     base, tool = (_round_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = sample_within_limits(table)
@@ -303,10 +310,9 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
-    """Return the largest absolute value (rad or m) of the joint that the row's joint mimics.
+    """Return the mimicked joint's largest absolute value.
 
-    If the table has no row of the mimicked joint, this value follows from the limits of the mimic joint.
-    Return 0 for a row without a mimic rule, or with the multiplier 0.
+    Without a mimic rule: 0.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0
@@ -318,10 +324,12 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
 
 
 def _bound_tip_error(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Return a bound (m) of the tip's position error due to the rounding of all numbers in a printed table.
+    """Bound the tip error due to rounded table numbers.
 
-    The rounding error of an angle moves the tip by at most this error times `lever`. The length `lever` is an
-    upper bound of the distance from the row's frame to the tip.
+        lever: upper bound of the distance from the row's frame to the tip
+        tip motion due to the rounding error of an angle <= error * lever
+
+    The unit is metres.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))

@@ -1,13 +1,14 @@
 """Export a table for two toolboxes: roboticstoolbox (Python) and MATLAB's Robotics System Toolbox.
 
-For roboticstoolbox the code makes a `DHRobot`. The rows of a DHRobot have four parameters, but Hayati rows
-have five parameters. A DHRobot has at least one joint. A table with Hayati rows, or a table without rows,
-therefore becomes a `Robot` of elementary transforms (Haviland and Corke).
+| Table | Object of roboticstoolbox |
+|---|---|
+| rows with four parameters | `DHRobot` |
+| Hayati rows, or no rows | `Robot` of elementary transforms (Haviland and Corke) |
 
-For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
-ignore theta of a revolute joint and d of a prismatic joint, and have no fifth parameter. The code therefore
-sets each joint's frame by a matrix, and the joint's axis is the z axis. The code is tested in Octave with
-substitutes for the toolbox's classes (`scripts/forms/octave`), but has not been tested in MATLAB.
+For MATLAB, the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms ignore theta of a
+revolute joint and d of a prismatic joint, and have no fifth parameter. The code therefore sets each joint's
+frame by a matrix, and the joint's axis is the z axis. The code is tested in Octave with substitutes for the
+toolbox's classes (`scripts/forms/octave`), but has not been tested in MATLAB.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from urdfkin.model.tree import FloatArray
 
 
 def write_roboticstoolbox(table: DHTable) -> str:
-    """Return a module with `robot`, a DHRobot or a Robot; raise InputError for a mimic joint."""
+    """Return a module with `robot`."""
     if table.has_hayati_rows or not table.rows:
         return write_ets(table)
     check_no_mimic(table, "DHRobot")
@@ -61,7 +62,7 @@ def _link_code(row: DHRow, convention: DHConvention) -> str:
 
 
 def write_matlab_rst(table: DHTable) -> str:
-    """Return a function file `ROBOT_tree.m`; its function returns a rigidBodyTree."""
+    """Return a file for a rigidBodyTree."""
     check_no_mimic(table, "rigidBodyTree")
     poses = frame_poses(table)
     lines = [
@@ -95,7 +96,7 @@ def write_matlab_rst(table: DHTable) -> str:
 
 
 def write_ets(table: DHTable) -> str:
-    """Return a module with the transforms `ets` and the `robot`; raise InputError for a mimic joint."""
+    """Return a module of elementary transforms."""
     check_no_mimic(table, "a sequence of elementary transforms")
     lines = docstring_lines(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
@@ -139,7 +140,10 @@ def _pose_transform(T: FloatArray, *, always: bool = False) -> list[str]:
 
 
 def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
-    """Return the screws as "terminal", "markdown", "html", "latex", "toml", "json", "numpy" or "matlab"."""
+    """Export screws in one format.
+
+    `form` is "terminal", "markdown", "html", "latex", "toml", "json", "numpy" or "matlab".
+    """
     if form == "latex":
         return _latex(screws, digits)
     if form in _EXACT_FORMS:
