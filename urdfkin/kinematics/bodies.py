@@ -58,7 +58,7 @@ from urdfkin.kinematics.rotation import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingFrame:
-    """The motion of frame 1 relative to frame 0.
+    """The motion of frame 1 relative to frame 0, in the axes of frame 0.
 
     Attributes:
         d_0_1: Vector from O_0 to O_1.
@@ -82,9 +82,9 @@ class MovingFrame:
 
 
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
-    """Return the motion of frame 2 (7.60, 7.61).
+    """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    `inner` is the motion of frame 2 relative to frame 1.
+    `inner` is the motion of frame 2 relative to frame 1, in frame 1.
 
     | quantity | equation |
     |---|---|
@@ -106,7 +106,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
-    """Return the motion of the last frame (7.50, 7.61).
+    """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
 
     Entry i is the motion of frame i + 1 relative to frame i.
     """
@@ -174,7 +174,7 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -
 def point_acceleration(
     frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
-    """Return the terms of a point's acceleration (7.125; 7.123 if fixed).
+    """Return the terms of a point's acceleration (7.125; 7.123 if v_1 = a_1 = 0).
 
     p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot
     """
@@ -260,9 +260,9 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Convert the velocity of frame n to the tool.
+    """Convert the velocity of frame n to the velocity of the tool.
 
-    d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}
+    d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, in frame 0
     """
     velocity, d = as_vectors(velocity, "velocity", 6), as_vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]

@@ -108,7 +108,7 @@ def point_position(d, R, p):
 
 
 def interorigin_vector(d, z, a, x):
-    """7.64: interorigin vector d z + a x."""
+    """7.64: distance d along the axis z plus length a along x."""
     return plus(times(d, z), times(a, x))
 
 
@@ -204,12 +204,12 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z] of a rotary joint."""
+    """7.80, 7.85: column [z x d; z]; d leads from the joint to the frame."""
     return cross(z, d), z
 
 
 def axis_rate(w, z):
-    """7.37: time derivative of an axis."""
+    """7.37: time derivative of an axis that is fixed to a link."""
     return cross(w, z)
 
 

@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 #: Normalising in double precision has an error of at most 4e-16.
 #: With six digits, Rodrigues' formula gives no rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest absolute entry of R R^T - I for a rotation matrix R.
+#: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
 #: R with nine decimals: each entry has an error of at most 5e-10.
 #: Entry of R R^T: dot product of two rows of R.
 #: Sum of the absolute entries of a row: at most sqrt(3).

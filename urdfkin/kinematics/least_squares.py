@@ -20,11 +20,13 @@ _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 #: Factor of the damping after a step that reduces the error,
 #: and factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: A step is slow if this fraction of the error remains.
+#: A step is slow if more than this fraction of the error remains.
 _SLOW = 0.99
-#: The iteration ends below this relative reduction of the squared error.
+#: The iteration ends if a full step would reduce the squared error
+#: by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: The norm of n residuals has this relative rounding error, times n eps.
+#: Relative rounding error of the norm of n residuals:
+#: at most this number times n eps.
 _NORM_ROUNDING = 4.0
 
 
@@ -41,7 +43,7 @@ def least_squares(
 
     The result is the best state and the norm of the residuals.
     `derivatives` returns the negative derivatives (rows, parameters).
-    No component of a step exceeds `max_step`.
+    No component of a step exceeds `max_step` in absolute value.
     The search ends after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0

@@ -290,7 +290,8 @@ def integrate_orientation(
 ) -> FloatArray:
     """Integrate 7.57 by the fourth-order Runge-Kutta method.
 
-    A jump of `w` must be at one of the increasing `times`.
+    `quat` is the orientation at the first of the increasing `times`, in s.
+    A jump of `w` must be at one of the `times`.
     Each step therefore evaluates `w` slightly inside the step.
     """
     times = as_finite(times, "times")
@@ -357,7 +358,7 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split p along and perpendicular to k (7.18)."""
+    """Return the parts of p parallel and perpendicular to k (7.18)."""
     axis, p = as_unit_vectors(axis, "axis"), as_vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
@@ -432,7 +433,7 @@ class EulerSequence:
         return self.first == self.third
 
     def reorder(self, values: FloatArray) -> FloatArray:
-        """Reverse the values for fixed axes."""
+        """Reverse the order of the values if the axes are fixed."""
         return values[..., ::-1] if self.is_fixed else values
 
 
@@ -490,7 +491,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     | proper, such as ZYZ | [0, pi] |
     | other | [-pi/2, pi/2] |
 
-    At the singularity, only the sum or difference of two angles is determined.
+    At the singularity, only the sum or difference of the
+    first and third angle is determined.
     The third angle then follows from the first angle.
     """
     axes = find_sequence(name)
@@ -525,7 +527,8 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Closer to the singularity (rad), Euler rates have too few digits.
+#: At this distance (rad) or less from the singularity,
+#: Euler angle rates have too few correct digits.
 NEAREST = 1e-9
 
 

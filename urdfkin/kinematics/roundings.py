@@ -108,7 +108,7 @@ The counts of an export's joint are
 | two components of an offset | 0.7, in multiples of the offset's length |
 | products with an omitted component, in matrix rows and cross products | below 1.5, as in the first row |
 
-| Difference of an export, not fused | At most, for each joint |
+| Difference of an export without fused multiply-adds | At most, for each joint |
 |---|---|
 | from Pinocchio, without the sums over the joints | 7.2 + 16.8 = 24.0 |
 | `PINOCCHIO_ROUNDINGS`, which does not cover these sums | 24.0 |
@@ -281,8 +281,8 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference of constant poses from the same file,
-#: in eps per joint.
+#: Allowed difference of the constant poses that two programs compute
+#: from the same file, in eps per joint.
 #: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps,
 #: from the first and third row of the first table above.
 #: Standard deviation: 2.4 eps, so 13.7 is nearly six of them.
@@ -337,7 +337,8 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference for a single factor.
 
-    `tilt` is the sum of the joints' tilts, rad.
+    Both arguments describe the path: `joints` is the number of joints,
+    and `tilt` is the sum of the joints' tilts, rad.
 
     Returns:
         Difference between urdfkin and Pinocchio, eps.

@@ -49,8 +49,9 @@ class LibraryModel:
     """A robot that a library has read.
 
     Attributes:
-        joints: Joints in the library's order.
-        poses: Returns poses relative to the root.
+        joints: Joints with a coordinate, in the library's order.
+        poses: Returns the pose (4, 4) of each link relative to the root.
+            Links that the library merged are missing.
     """
 
     joints: list[str]

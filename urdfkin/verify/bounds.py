@@ -82,7 +82,7 @@ class Magnitudes:
     """Upper bounds on a frame's position, velocity and acceleration.
 
     Attributes:
-        p: (n, frames) path length from the world origin, m.
+        p: (n, frames) path length with prismatic displacements, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
@@ -304,7 +304,7 @@ class Bound:
     Results must be equal where the scale is 0.
 
     Attributes:
-        scale: Bound on the sum of absolute terms.
+        scale: Bound on the sum of absolute terms, in the unit of the result.
         k: Allowed difference, in eps * scale.
     """
 
@@ -369,7 +369,7 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors, eps rad.
-        rule_count: Number of mimic rules on the path.
+        rule_count: Number of mimic rules on the path. A chain of r rules counts r times.
         lengths: (steps + 1,) additional `CompiledTree.lengths`, m.
     """
 
@@ -420,7 +420,7 @@ def true_value_magnitudes(
     | roundings of each term of X | at most 3 r |
     | error of the displacement, for separate and combined rules | at most 1.5 r X eps |
     | abs(M q) + abs(C), if the offsets of a chain cancel | far below X |
-    | length of the displacement in the bound (`errors.lengths`) | X |
+    | length of the displacement in the bound, with `errors.lengths` | X |
     | allowed relative error | 1.5 eps for each rule |
     | roundings of the joint velocity and acceleration | fewer than of the displacement |
     """

@@ -110,7 +110,7 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        A subclass of NumPy's array is invalid, because `reshape` may return another shape.
+        A subclass other than `memmap` is invalid: its `reshape` may return another shape.
         With another shape, a kernel could write past the end of `out`.
         """
         if out is None:

@@ -26,7 +26,7 @@ _ledger_lock = make_fork_safe_lock()
 
 
 class VerificationError(UrdfkinError):
-    """The results of urdfkin and the oracle differ by more than rounding.
+    """The results of urdfkin and the oracle differ by more than rounding can explain.
 
     At least one of the two results is wrong.
 

@@ -106,7 +106,7 @@ def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray,
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # For fewer rows than n, the kernel needs working memory.
+        # If `size` has fewer than n rows, the kernel needs working memory.
         if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)

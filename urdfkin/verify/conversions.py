@@ -174,7 +174,8 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
     Rotation matrices are unique; angles at gimbal lock and signs of quaternions are not. The bound includes
     the rounding errors of `R`.
 
-    `numbers` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last.
+    `numbers` contains roll, pitch, yaw (n, 3) in rad, or quaternions (n, 4), scalar last. `again(k)` returns
+    a command that computes sample k again.
     """
     pin = pinocchio()
     if numbers.shape[-1] == 3:

@@ -64,7 +64,7 @@ def _largest_difference(ours, theirs, scale, i, k):
     """Compare two rows of finite numbers.
 
     Returns:
-        Units of eps * `scale[k]`.
+        Largest difference, in units of eps * `scale[k]`.
     """
     largest = 0.0
     for j in range(ours.shape[1]):
@@ -87,7 +87,8 @@ def _has_equal_triples(scale, k):
 def _divide_triples(ours, theirs, unit, width, units):
     """Compare three rows with equal scales.
 
-    The quotients in `units` may be NaN or inf.
+    The array `units` receives the largest quotient of each column.
+    A quotient may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -129,7 +130,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
 
     - `scale`: the rows repeat if `scale` is shorter than `out`
     - `out`: largest difference in each row, in units of eps * scale; inf for inf or NaN
-    - `unit`, `units`: working memory for `scale` and for one row; used only if the rows repeat
+    - `unit`, `units`: working memory, as large as `scale` and as one row of `scale`;
+      used only if the rows repeat
     - `out_bits`, `bits`: views of `out` and `units` as integers
     """
     known = in_triples = len(scale) < len(out)

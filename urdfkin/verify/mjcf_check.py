@@ -51,7 +51,8 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        shapes_refusal: Why MuJoCo rejects the complete file, or None.
+        shapes_refusal: Why MuJoCo rejects the complete file, or None. After a rejection,
+            MuJoCo reads the file without shapes and inertias.
     """
 
     urdf: str

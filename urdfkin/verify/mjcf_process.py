@@ -85,6 +85,8 @@ def parse_answers(
 ) -> tuple[list[dict[str, Any]], str]:
     """Parse the output of a process.
 
+    `status` is None if the process exceeded `timeout` (s).
+
     Returns:
         The answers, and why others may be missing.
     """
@@ -207,7 +209,8 @@ def _pinocchio_placements(
 def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield each joint's name, index in q and size.
 
-    Pinocchio combines the joints of a body into one composite joint.
+    Pinocchio combines the joints `x` and `y` of a body into `Composite_x`.
+    Each combined joint has one number in q.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -75,8 +75,11 @@ class _MujocoIndices:
     """First indices of a moving joint.
 
     Attributes:
-        q: -1 for a moving base.
-        v: -1 for a moving base or locked joint.
+        qpos: Index in MuJoCo's vector.
+        qvel: Index in MuJoCo's vector.
+        q: Index in urdfkin's q; -1 for a moving base.
+        v: Index in urdfkin's v; -1 for a moving base or locked joint.
+        multiplier: 0 for a locked joint.
         offset: Value of a locked joint.
     """
 
@@ -265,7 +268,7 @@ class MujocoOracle(Oracle):
         """Return the placements of all frames.
 
         MuJoCo receives the first `count` of the inputs q, v and a.
-        The function `read` reads further results from `self.data`.
+        `read(body, (k, f))` reads further results of sample k and frame f.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
@@ -295,7 +298,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _read_six_vector(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Read the velocity or acceleration of a body."""
+        """Read a velocity or acceleration [linear; angular] in world axes."""
         six = np.empty(6)
         # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
@@ -410,7 +413,7 @@ def _move_mass_to_root(model: Any, root: str) -> Any:
 
 
 def _read_joints(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]]:
-    """Return the joints depth first, and the links.
+    """Return the joints depth first, and the links root first.
 
     Siblings are sorted by name.
     """

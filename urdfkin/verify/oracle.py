@@ -87,7 +87,7 @@ def resolve_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
 
 
 def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
-    """Return the values of all locked joints.
+    """Return the values of locked joints and of their mimic joints.
 
     >>> find_locked_values({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
@@ -130,7 +130,7 @@ class PinocchioLayout:
     """Converts between Pinocchio's and urdfkin's layouts.
 
     Attributes:
-        rate_columns: Columns of all moving joints.
+        rate_columns: Pinocchio's Jacobian columns of moving joints, mimic joints included.
     """
 
     def __init__(
@@ -184,7 +184,7 @@ class PinocchioLayout:
         )
 
     def convert_q(self, q: FloatArray) -> FloatArray:
-        """Convert q to Pinocchio's layout."""
+        """Convert q to Pinocchio's layout, with normalized quaternions."""
         if self._same_q:
             return np.ascontiguousarray(q)
         full = np.zeros((len(q), self._model.nq))
@@ -447,8 +447,10 @@ class QueryBatch(NamedTuple):
     Pinocchio's functions for one and for several frames may round differently.
 
     Attributes:
-        frames_are_joints: Whether Pinocchio uses functions for joints.
-        is_partial: Whether a longer list contains `frames`.
+        frames_are_joints: Whether `frames` contains `JointFrame` objects.
+            Pinocchio then uses its functions for joints.
+        is_partial: Whether `frames` is a part of a longer list.
+            Pinocchio then uses its function for several frames.
     """
 
     frames: Sequence[str]
@@ -679,6 +681,7 @@ def couple_columns(
 
     The kernel and NumPy return identical results.
     `columns` lists the added columns of J_full, in this order.
+    Column i, multiplied by `factor[i]`, is added to column `index[i]`.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:

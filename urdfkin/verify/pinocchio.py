@@ -109,7 +109,7 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 #: Stack per link, bytes; Pinocchio 4.1.0 needs less than 4 kB.
 _STACK_BYTES_PER_LINK = 16_384
-#: Shorter chains cause no stack overflow in any thread.
+#: Chains with fewer links cause no stack overflow in any thread.
 _SAFE_DEPTH = 100
 #: Maximum nv. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), here 2 GB.
 MAX_NV = 315
@@ -188,7 +188,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds all known causes of this error.
+        # `urdfkin check` finds known causes before Pinocchio reads the text.
         # The cause of this error is therefore unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
@@ -332,7 +332,7 @@ class PinocchioOracle(Oracle):
 
         - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
         - In LOCAL, two velocities of one joint may have a nonzero entry. The true value is 0, because a
-          joint's motion does not change the joint's own columns.
+          joint's motion does not change the joint's own columns in the frame's axes.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv

@@ -52,7 +52,8 @@ class Quantity:
     Attributes:
         inputs: "q", "qv" or "qva".
         shape: Shape of one result, for example (6, "nv").
-        compute: Function (plan, *inputs, reference, base=, out=, threads=) of urdfkin.
+        compute: Function (plan, *inputs, reference, base=, out=, threads=) for urdfkin's results.
+            If `recursive` is False, other arguments are possible.
         ask_oracle: Function (oracle, query) for the oracle's results.
         blocks: Function (oracle, query) that yields blocks of results.
         scale: Function (plan, magnitudes, reference) for the scale of the bound.

@@ -31,11 +31,13 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 
 #: Largest size of a set of linearly dependent columns.
 _MAX_SET_SIZE = 4
-#: Larger Jacobians are not searched.
+#: Jacobians with more columns are not searched for dependent sets.
 _MAX_COLUMNS = 16
-#: Rounding error of a singular value, per eps and (rows + columns).
+#: Relative rounding error of a singular value decomposition,
+#: divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
-#: Smaller fractions of the norm count as 0 at random configurations.
+#: At random configurations, singular values below this fraction
+#: of the norm count as 0.
 _NEGLIGIBLE = 1e-9
 
 
@@ -48,9 +50,10 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) None for planar, floating and mimicked joints.
+        is_revolute: (nv,) True for revolute and False for prismatic joints;
+            None for planar, floating and mimicked joints.
         active_entries: (6, nv) False for entries that are always 0.
-        sample_jacobians: Function that returns random Jacobians (n, 6, nv).
+        sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations.
         moving_base: Whether a base motion is given.
     """
 
@@ -83,8 +86,8 @@ class Singularity(Displayable):
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
         lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. The
-            array is empty if urdfkin cannot determine the directions. This can happen if the frame never
-            moves in all directions.
+            array is empty if urdfkin cannot determine the directions. This happens if the frame cannot move
+            in some directions in any configuration, and these directions depend on q or on a moving base.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 
@@ -153,7 +156,7 @@ class _Explanation:
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
         # With more rows than columns, the frame never moves in some directions.
-        # If they depend on q, the lost directions are unknown.
+        # If these directions depend on q, the lost directions are unknown.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -174,7 +177,7 @@ class _Explanation:
         """Compare the Jacobians at random configurations.
 
         Returns:
-            The largest rank, and the directions without motion.
+            The largest rank, and the directions without motion in all samples.
         """
         samples = self._columns.sample_jacobians()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)

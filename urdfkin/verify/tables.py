@@ -47,7 +47,8 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows, in reaches (docs/dh.md).
+#: Largest length in a table with Hayati rows,
+#: as a multiple of the robot's reach (docs/dh.md).
 MAX_LENGTH_RATIO = 10.0
 
 
@@ -141,7 +142,7 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
 
 
 def table_length(table: DHTable) -> float:
-    """Return the sum of all lengths, with base and tool."""
+    """Return the sum of all lengths, with base and tool, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
@@ -244,8 +245,9 @@ class ErrorScales:
 
     Attributes:
         reach: (n,) reach, m; see the module's docstring.
-        turning: (columns,) sum of |multiplier| over revolute joints on both paths.
-        sliding: (columns,) sum of |multiplier| over prismatic joints on both paths.
+        turning: (columns,) sum of |multiplier| over revolute joints
+            on the paths from the root to the table's base and tip.
+        sliding: (columns,) sum of |multiplier| over prismatic joints on these paths.
         rates: (n,) sum of all |v|.
         accelerations: (n,) sum of all |a|.
         rounding: (n,) relative error. The bound includes angles between axes that the table treats as
@@ -317,5 +319,5 @@ class _SnapEffect:
 
 
 def _split_rows(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return linear and angular maxima."""
+    """Return the largest absolute values of linear and of angular rows."""
     return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

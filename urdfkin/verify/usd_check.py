@@ -47,7 +47,7 @@ _ROTATION_ROUNDINGS = 18.0
 #: Rounding errors in a joint's origin, see `_check_joint`.
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
-#: Angle error of one operation, in `SINGLE_ROUNDOFF`, rad.
+#: Largest angle error of one operation, in `SINGLE_ROUNDOFF` rad.
 #: `_compare_prims` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
@@ -178,7 +178,7 @@ class SinglePrecisionErrors:
     """Bounds on errors of rounding to single precision.
 
     Attributes:
-        links: (links, 2) position error (m), angle error (rad), in all configurations.
+        links: (links, 2) largest position error (m), angle error (rad), over all configurations.
         joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
             Columns 0 and 1 describe the child link in the parent link, at q = 0.
     """
@@ -270,7 +270,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)[0]
-    # The root's pose is arbitrary, so poses are relative to it.
+    # The root's pose is arbitrary, so poses are relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest

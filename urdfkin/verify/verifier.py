@@ -182,7 +182,7 @@ class Verifier:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the file, or of the URDF text."""
+        """SHA-256 of the MJCF or USD file, or of the URDF text."""
         # The import is slow, because hashlib loads OpenSSL.
         import hashlib
 
@@ -225,9 +225,9 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Add a check to a compiled function.
 
-        The last argument is `out`.
-        The result None means that `compute` does not support the arguments.
-        If the oracle cannot check the robot, the result is always None.
+        The returned function has the arguments of `compute`; the last is `out`.
+        The function returns None if `compute` does not support the arguments.
+        If the oracle cannot check the robot, the function always returns None.
         """
         quantity, library, frames = QUANTITIES[name], self.library, (frame,)
         if self.find_refusal(None, library) is not None:
@@ -401,7 +401,8 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    A path of revolute joints has a constant length.
+    If the base is fixed and all joints are revolute, path lengths are constant.
+    The bound of a placement or a Jacobian is then constant too.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0

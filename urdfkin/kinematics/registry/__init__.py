@@ -44,9 +44,9 @@ class Equation:
 
     Attributes:
         statement: The equation in plain characters.
-        definitions: Functions of `urdfkin.kinematics.equations`.
-        functions: Names such as "module:name".
-        tests: Names such as "file::name".
+        definitions: Functions of `urdfkin.kinematics.equations` with the formula.
+        functions: Functions that compute the equation, as "module:name".
+        tests: Tests that detect a wrong computation, as "file::name".
         oracle: Independent source of expected results.
     """
 
@@ -71,7 +71,11 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter."""
+    """A wrong or incomplete statement in the chapter.
+
+    Attributes:
+        test: Test that proves the mistake, as "file::name".
+    """
 
     where: str
     printed: str

@@ -38,7 +38,8 @@ _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
 #: Additional bits of an interval: 15 digits have 50 + 5 bits.
-#: With 53 bits, an interval could be four doubles wide.
+#: With 53 bits, an interval could be four times as wide
+#: as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
 #: Significant digits of a written decimal; 17 digits determine a double.
 _SIGNIFICANT_DIGITS = 17
@@ -193,7 +194,7 @@ def _orthogonality_defect(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with the attribute `quat_xyzw`.
+#: First URDF version with the attribute `quat_xyzw`; older versions ignore it.
 _FIRST_QUATERNION_VERSION = (1, 1)
 
 
@@ -230,7 +231,7 @@ def conversion_errors(text: str, tree: KinematicTree, path: Sequence[int], q: Fl
 
 
 # The cache avoids parsing the same URDF twice.
-# Parsing a large URDF is slower than one sample.
+# Parsing a large URDF is slower than computing one sample.
 @lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = INTERVALS) -> None:
