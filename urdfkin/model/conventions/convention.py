@@ -59,13 +59,14 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """Rule for joint values of another program.
+    """The conversion of a joint value to another program's value.
 
-    The other value is factor * value + zero.
+    The other program's value is factor * (value in rad or m) + zero.
 
     Attributes:
-        unit: "rad", "deg", "turn", "m", "mm" or units per turn.
-            None selects the convention's unit.
+        zero: The other program's value for the joint value 0.
+        unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn.
+            None selects the convention's unit; `factor` is then None.
     """
 
     name: str | None = None
@@ -88,7 +89,7 @@ class JointRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Convention:
-    """The layout of vectors in another program.
+    """The layout of q, v, a and six-vectors in another program.
 
     The defaults are urdfkin's convention. `conventions.toml` explains each attribute.
     """
@@ -129,7 +130,7 @@ def _load_built_in() -> dict[str, Convention]:
     }
 
 
-#: Built-in conventions, in the order of conventions.toml.
+#: Names of the built-in conventions, in the order of conventions.toml.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
@@ -155,7 +156,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse a convention's TOML text.
 
-    `name` is the default name.
+    `name` is the convention's name if the text contains none.
     """
     try:
         entries = tomllib.loads(text)
@@ -266,10 +267,9 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: Characters of an encoded number.
-#: A character's value is its index, from 0 to 61.
-#: The last character of a number has a value below `_THRESHOLD`;
-#: all others have larger values.
+#: The value of a character in an encoded number is its index in `_DIGITS`, from 0 to 61.
+#: The value of a number's last character is below `_THRESHOLD`.
+#: The values of all other characters are at least `_THRESHOLD`.
 _THRESHOLD = 31
 
 
@@ -291,7 +291,7 @@ def spell_name(name: str, style: str) -> str:
 
 
 def spellings(name: str) -> frozenset[str]:
-    """Return all spellings of a name.
+    """Return the spellings of a name in all styles.
 
     >>> sorted(spellings("arm-2"))
     ['arm-2', 'arm_2', 'tn__arm2_g6']
@@ -300,7 +300,7 @@ def spellings(name: str) -> frozenset[str]:
 
 
 def make_identifier(name: str) -> str:
-    """Replace invalid bytes like OpenUSD's `TfMakeValidIdentifier`.
+    """Replace each invalid byte by "_", as OpenUSD's `TfMakeValidIdentifier` does.
 
     >>> make_identifier("1"), make_identifier("arm-2")
     ('_', 'arm_2')
@@ -310,14 +310,16 @@ def make_identifier(name: str) -> str:
 
 
 def transcode(name: str) -> str:
-    """Transcode a name like `usdex.core.getValidPrimName` of OpenUSD Exchange.
+    """Transcode a name as `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     An identifier is returned unchanged.
 
-        result:   "tn__" + letters, digits, "_" (ASCII) + "_" if there are any + numbers
-        numbers:  d n + p in base 62, as in Punycode, in the order of the code points
+        result:   "tn__" + kept characters + "_" if any character is kept + numbers
+        kept:     letters, digits and "_" (ASCII)
+        numbers:  d n + p in base 62 for each other character, as in Punycode,
+                  in the order of the code points
 
-        d:   code point minus the previous code point
+        d:   code point minus the previous code point (at first 0)
         n:   number of possible positions
         p:   position among the characters that are already encoded
 

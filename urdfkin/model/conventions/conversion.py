@@ -34,8 +34,8 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """A number of the target program's q or v.
 
-    The number is factor * x[index] + zero, where x is urdfkin's q or v.
-    `part` is "cos", "sin" or "".
+    The number is y = factor * x[index] + zero, where x is urdfkin's q or v.
+    If `part` is "cos" or "sin", the number is cos(y) or sin(y).
     """
 
     name: str
@@ -49,13 +49,13 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A joint with another velocity definition.
+    """A planar or floating joint whose velocity the target program defines differently.
 
     Attributes:
         q: First index in urdfkin's q.
         v: First index in urdfkin's v.
-        rows: Indices in the target's v.
-        point: (3,) point of the velocity, in the joint's frame.
+        rows: Indices in the target program's v.
+        point: (3,) point of the target program's linear velocity, in the joint's frame (m).
     """
 
     joint: Joint
@@ -70,12 +70,12 @@ class Conversion:
 
     Args:
         tree: The robot.
-        urdf: The URDF text.
+        urdf: The URDF text, the source of some joint orders and centres of mass.
         convention: The convention.
-        joints: Order of the joints; required if the convention has none.
+        joints: Order of the joints, instead of the convention's; required if the convention has none.
 
     Raises:
-        InputError: The order is wrong, or two columns have the same name.
+        InputError: The order is wrong, two joints get the same name, or a rule does not fit its joint.
         UnknownNameError: A joint is unknown.
 
     >>> import urdfkin
@@ -162,7 +162,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(parse_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The rank -1 puts an added root joint first.
+        # The URDF text lacks a root joint that urdfkin added; the rank -1 puts this joint first.
         ranks = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
@@ -184,9 +184,9 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Sort the joints breadth first.
+        """Sort the joints breadth first, and siblings by `keys`.
 
-        If `merged` is true, a fixed joint merges two links.
+        If `merged` is true, links that a fixed joint connects count as one link.
         """
 
         def below(link: int) -> list[int]:
@@ -367,7 +367,7 @@ class Conversion:
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """Indices in the target program's q and v, by joint name."""
+        """Indices in the target program's q and v, by the joint's name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
         indices, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -390,7 +390,7 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, v and a to the target program's convention.
 
-        If q is equal in both conventions, the result can be the array q.
+        If q is equal in both conventions, the result can be the array q itself.
 
         Raises:
             InputError: A length is wrong, or a number is not finite.
@@ -420,7 +420,8 @@ class Conversion:
         """Convert q, v and a from the target program's convention.
 
         Raises:
-            InputError: A length is wrong, or a number is not finite. A value contradicts a mimic rule.
+            InputError: A length is wrong, or a number is not finite.
+                A mimic joint's value contradicts its rule.
                 The norm of a (cos, sin) pair is not 1 within 1e-6.
 
         >>> import urdfkin
@@ -579,7 +580,7 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 with v = M^-1 v_tool.
 
-        The columns of redundant numbers, such as velocities of mimic joints, are 0.
+        The columns of redundant numbers of v_tool, such as velocities of mimic joints, are 0.
 
         Returns:
             (..., nv, program's nv) matrix.
@@ -594,9 +595,9 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return a joint's block of `matrix`.
+        """Return the block of `matrix` for a planar or floating joint.
 
-        If v is given, return the block's time derivative.
+        `q` is the robot's q. If the joint's own velocity v is given, return the block's time derivative.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -625,7 +626,7 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def reorder_six_vector(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Convert six-vectors to the target program's order.
+        """Convert six-vectors to the target program's order of linear and angular part.
 
         A second call restores the original order.
 
@@ -644,7 +645,7 @@ class Conversion:
         return self.columns(q, self.reorder_six_vector(J, -2))
 
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert the columns of a matrix to J M^-1.
+        """Convert the columns of a matrix J to the target program: J M^-1.
 
         Each row must have the same meaning in both conventions.
 
@@ -676,7 +677,7 @@ class Conversion:
     def jacobian_rate(
         self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
     ) -> FloatArray:
-        """Convert a Jacobian's rate J' to S (J' M^-1 + J (M^-1)')."""
+        """Convert the time derivative J' of a Jacobian J to S (J' M^-1 + J (M^-1)')."""
         converted = self.jacobian(q, rate)
         if self.is_constant:
             return converted
@@ -721,9 +722,9 @@ class Conversion:
 
         Args:
             quantity: For example "velocity".
-            inputs: q, v and a, as needed.
-            result: In urdfkin's convention.
-            jacobian: Called only for rates and Hessians.
+            inputs: q, v and a in urdfkin's convention, as far as the quantity needs them.
+            result: The quantity in urdfkin's convention.
+            jacobian: Returns the Jacobian; called only for "jacobian rate" and "hessian".
 
         Raises:
             InputError: No convention defines the quantity.
@@ -760,7 +761,7 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """The conversion x[..., index] * factor + zero."""
+    """The conversion of a vector x to x[..., index] * factor + zero."""
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
@@ -782,7 +783,7 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the reordering between two conventions.
+    """Return the conversion of "q" or "v" between two conventions as a reordering.
 
     A reordering cannot convert angles to cosines, or change a velocity's frame.
 
@@ -824,9 +825,9 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Find the source of each number of q or v.
+    """For each number of urdfkin's q or v, find a number of the target program that determines it.
 
-    Mimic joints have the lowest priority.
+    Numbers of mimic joints have the lowest priority.
     """
     return [
         min(
@@ -854,5 +855,5 @@ def _replace_slice(array: FloatArray, where: slice, part: FloatArray) -> FloatAr
 
 
 def _add_frame_axis(M: FloatArray, ndim: int) -> FloatArray:
-    """Make M broadcast with several frames."""
+    """Reshape a batch of matrices to (..., 1, k, l) for Jacobians of several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

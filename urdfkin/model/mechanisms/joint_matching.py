@@ -132,9 +132,9 @@ class JointMatcher:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether B has all joint axes of A.
+        """Return whether each joint axis at A's body coincides with one at B's body.
 
-        X (4, 4) moves B.
+        X (4, 4) moves B before the comparison.
         """
         return all(
             any(
@@ -149,9 +149,9 @@ class JointMatcher:
     def rank_candidates(
         self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray
     ) -> list[Edge]:
-        """Return the joints of B, most similar first.
+        """Return the joints of B, most similar to `e` first.
 
-        Joints that the user matched are omitted.
+        X (4, 4) moves B before the comparison. Joints that the user matched are omitted.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -252,7 +252,7 @@ Both = tuple[_Some, _Some]
 class Axis:
     """A joint's axis in the zero configuration.
 
-    `reference` is usually the previous axis. The axis of a prismatic joint has no position.
+    `reference` is a line, usually the previous joint's axis. The axis of a prismatic joint has no position.
     """
 
     screw: Screw
@@ -278,9 +278,9 @@ class Axis:
 
 
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
-    """Yield joint values that may align two axes.
+    """Yield joint values (rad or m) that may move `axis_b` to `axis_a`.
 
-    The joint has the axis u.
+    The axis of the joint is u.
     """
     if not turns:
         heights = axis_a.height(u.direction), axis_b.height(u.direction)
@@ -304,7 +304,10 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of later joint axes."""
+    """Yield pairs of later joint axes of the same kind.
+
+    The search continues outwards only after an axis of A that is parallel to A's reference line.
+    """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
@@ -315,15 +318,15 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B that align two axes.
+    """Yield poses of B's root that align an axis of B with an axis of A.
 
-    A rotation or shift that no axis determines is 0.
+    A rotation about this axis or a shift along it is 0 if no other axis determines it.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # Axes of other branches then determine the pose of B's root.
-        # For example, each rotor of a drone is a branch.
+        # Without a later axis on this branch, axes of other branches determine the pose of B's root.
+        # For example, each rotor of a drone is a branch with one joint.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -336,7 +339,10 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B that align axes of one body."""
+    """Yield poses of B's root that align up to three joint axes of one body.
+
+    If these axes do not determine the shift along the first axis, later axes determine it.
+    """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
     turning = [i for i, axis in enumerate(axes_a) if axis.turns]
@@ -391,9 +397,10 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first revolute axes of all branch pairs.
+    """For each branch of A and each branch of B, return the first pair of revolute axes.
 
-    Each item also contains the axes before and after.
+    Each item also contains the prismatic pairs before this pair, and the pairs after it.
+    Without a revolute pair, the item contains the last prismatic pair instead.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -433,16 +440,21 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 #: and the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joint pairs per pair of bodies.
+#: Maximum number of joint pairs that the exact search tries for each pair of bodies.
 MOST_ASSIGNMENTS = 5000
 
-#: Matching coordinate of B, and velocity ratio B / A.
+#: For each coordinate of A: matching coordinate of B, and velocity ratio B / A.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """Result of matching two subtrees."""
+    """The result of an exact match of two subtrees.
+
+    Attributes:
+        X: (4, 4) pose of B's body after the two joints.
+        ratios: Velocity ratios of the coordinates of both subtrees.
+    """
 
     X: FloatArray
     ratios: VelocityRatios
@@ -470,15 +482,15 @@ class SubtreeMatcher:
     def joint_pairs(
         self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
     ) -> Sequence[EdgePair] | None:
-        """Return the joint pairs of two equal subtrees.
+        """Return the joint pairs of two subtrees that match exactly.
 
-        X (4, 4) moves B. The result is None if the subtrees differ.
+        X (4, 4) moves B before the comparison. The result is None without an exact match.
         """
         found = self._match_bodies(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose of B's body after joint f."""
+        """Return the pose (4, 4) of B's body after joint f; None without an exact match."""
         found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -576,9 +588,9 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether the joint can move X to `other`.
+        """Return whether a motion of the joint can move the pose X to `other`.
 
-        Planar joints need equal poses.
+        For a planar joint, the two poses must be equal.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

@@ -56,18 +56,18 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Maximum depth, in joints, for the search for an exact match.
+#: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
-#: Maximum number of later joints that decide between equal choices.
+#: Maximum number of later joints on a branch that decide between equally good choices.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root in this search.
+#: Maximum number of poses from joint axes that the exact search tries for a pair of bodies.
 MOST_ROOT_POSES = 48
-#: The score counts agreeing links and axes; equal scores compare
-#: the largest differences (m).
-#: A difference is better if it is below this fraction of the other.
+#: A score with more agreeing links and axes is better.
+#: For equal numbers, a score is better if its largest difference (m) is
+#: smaller than this factor times the largest difference of the other score.
 BETTER_RATIO = 0.5
 
-#: A zero offset (rad or m), or a planar or floating joint's pose.
+#: A zero offset (rad or m), or the motion N of a planar or floating joint.
 _Choice = TypeVar("_Choice", float, FloatArray)
 #: Number of agreeing links and axes, and largest difference (m).
 Score = tuple[int, float]
@@ -75,9 +75,12 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on comparisons of later joints.
+    """A limit on the number of later joint pairs that are compared.
 
     Several matchers can share a limit.
+
+    Attributes:
+        remaining: Number of joint pairs that may still be compared.
     """
 
     remaining: int
@@ -85,14 +88,15 @@ class LookAhead:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPair:
-    """Two corresponding bodies.
+    """A body of A and the corresponding body of B.
 
-    Both motions start at the zero configuration.
+    Both motions start at the zero configuration of the moved body.
 
     Attributes:
-        via: Joints before the bodies, if any.
-        G: (4, 4) motion of A's body to B's body.
-        XC: (4, 4) motion of B's body.
+        via: The joints of A and of B before the bodies; None at the first bodies.
+        previous: Index of the previous joint pair, or -1.
+        G: (4, 4) motion of A's body to the current pose of B's body.
+        XC: (4, 4) motion of B's body to its current pose.
     """
 
     bodies: tuple[int, int]
@@ -105,7 +109,8 @@ class BodyPair:
 class MechanismMatcher:
     """Match the joints of two mechanisms.
 
-    Without `choices`, the matcher searches for all values.
+    Without `choices`, the matcher searches for B's root pose, signs, zero offsets and conversions.
+    `base` contains the indices of the first links; None if the matcher chooses the first bodies.
     """
 
     def __init__(
@@ -147,7 +152,7 @@ class MechanismMatcher:
         return best
 
     def _start_candidates(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield first bodies and root poses."""
+        """Yield pairs of first bodies, each with a pose (4, 4) of B's root in A's root frame."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -175,10 +180,10 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matches.
+        """Return an upper bound on the number of matches from the bodies `base`.
 
         Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
-        The sum is largest if the branches are sorted by size.
+        The sum of the bounds is largest if the branches are paired in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -228,7 +233,7 @@ class MechanismMatcher:
             yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
-        # B's root can match a body behind A's floating root joint.
+        # B's root can match a body of A after a joint, for example after a floating root joint.
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
@@ -276,7 +281,7 @@ class MechanismMatcher:
         return self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: EdgePair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield possible poses of B's next body."""
+        """Yield possible poses of B's next body; see `ProposePoses`."""
         next_pair = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = motion_type(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -311,7 +316,10 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair two different end-effector frames."""
+        """Pair two links as different end-effector frames.
+
+        The labels of these links occur in one model only.
+        """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -418,7 +426,7 @@ class MechanismMatcher:
         body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
         # P_a, P_b: the joint's poses in A and B; P_b = M P_a N.
-        # From child to parent, P_a and P_b are the inverse poses.
+        # If the path leads from child to parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
@@ -438,7 +446,8 @@ class MechanismMatcher:
         """Yield candidates for the rigid motion N.
 
         The module `mechanism` defines N.
-        `plane` is one possible N of a planar joint. `pose_a` includes the motion G.
+        `plane` is one possible N of a planar joint, and None for a floating joint.
+        `pose_a` includes the motion G.
         """
         yield IDENTITY if plane is None else plane
         candidates = [next_pair.XC]
@@ -479,7 +488,7 @@ class MechanismMatcher:
             offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # K displaces the axis alone, or with all later bodies.
+        # Either K displaces the axis and all later bodies of B, or only the axis.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
         with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -499,7 +508,7 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _zero_choice(self, joint: str) -> tuple[int, float | None]:
-        """Return the prescribed sign and offset.
+        """Return a joint's prescribed sign and zero offset.
 
         Without `choices`, the result is (0, None).
         """
@@ -518,9 +527,10 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
     ) -> tuple[_Choice, BodyPair, Score]:
-        """Return the best of several choices.
+        """Return the choice for which most links and axes agree.
 
-        Perpendicular axes that intersect allow two poses of B, so a third axis decides.
+        Later joints decide between equally good choices. For example, perpendicular axes that intersect
+        allow two poses of B, so a third axis decides.
         """
         scored = list[tuple[_Choice, BodyPair, Score]]()
         for choice, body_pair in choices:
@@ -578,7 +588,7 @@ class MechanismMatcher:
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
-    """Count bodies and links per subtree."""
+    """Count the bodies and links of each body's subtree."""
     sizes = [(1, len(links)) for links in mechanism.bodies]
     for edge in reversed(mechanism.edges):
         bodies, links = sizes[edge.outer]
@@ -625,10 +635,10 @@ def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> li
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Make two planes parallel.
+    """Make the planes of two joints parallel.
 
     Returns:
-        Rotation (4, 4), angle (rad), shift 0.
+        Smallest rotation (4, 4), its angle (rad), and the shift 0.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (pose_a, pose_b))
     return smallest_motion(
@@ -636,14 +646,14 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
     )
 
 
-#: Maximum number of joint orders: those of five prismatic joints.
+#: Maximum number of joint orders that are tried; five prismatic joints have 120 orders.
 MOST_ORDERS = 120
-#: Maximum number of compared later joint pairs, see `LookAhead`.
+#: Maximum number of later joint pairs that a search compares; see `LookAhead`.
 #: Without names, TALOS needs 500 pairs, and Baxter 1,000.
 MOST_LOOK_AHEAD = 2000
-#: Larger angle tolerances for models that differ, rad.
+#: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Maximum number of attempts to exchange two partners.
+#: Maximum number of attempts to exchange the partners of two joint pairs.
 MOST_EXCHANGED = 12
 
 
@@ -700,11 +710,11 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
-    """Exchange partners of joint pairs.
+    """Exchange the partners of two joint pairs if this improves the alignment.
 
     Robots with mirrored arms can need exchanges.
     """
-    # A joint without a partner cannot agree.
+    # If a joint has no partner, no exchange makes the models agree.
     if best.only_a or best.only_b:
         return best
     tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)
@@ -725,6 +735,7 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
     """Search again with larger tolerances.
 
     If all axes differ slightly, no axes agree within the normal tolerance.
+    The choices of this search are applied with the normal tolerance.
     """
     a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
@@ -757,11 +768,11 @@ def _best_alignment(
     ).find_best()
 
 
-#: Full turns that may fit a zero offset to the mimic rules.
+#: Numbers of full turns that are added to a revolute joint's zero offset on trial.
 FULL_TURNS = (0, 1, -1)
-#: Tolerance of a zero offset, in angle tolerances.
+#: Tolerance of a zero offset, as a multiple of the angle tolerance.
 #: A zero offset is computed from the axes of two joints.
-#: It is inexact if these axes are close.
+#: The zero offset is inexact if these axes are close to each other.
 OFFSET_FACTOR = 1e4
 
 
@@ -779,8 +790,8 @@ class _Rule:
         slope: s m
         constant: s c
         offset: o
-        free: Whether o can have any value.
-        has_effect: Whether matched links or later axes move.
+        free: Whether o can have any value, because no later link or axis determines o.
+        has_effect: Whether the joint moves matched links or later axes.
     """
 
     step: int
@@ -794,7 +805,7 @@ class _Rule:
     has_effect: bool
 
     def beta_for(self, turn: int) -> float:
-        """Return beta after adding full turns to o."""
+        """Return beta after `turn` full turns are added to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def offset_for(self, beta: float) -> float:
@@ -811,7 +822,7 @@ class _Rule:
 def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
     """Return new zero offsets that fit the mimic rules.
 
-    The keys are A's joint names.
+    The keys are A's joint names, the values are signs and zero offsets (rad or m).
     """
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
@@ -860,9 +871,9 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later links or axes determine an offset.
+    """Return whether later links or axes determine the zero offset of joint pair i.
 
-    Also return `_Rule.has_effect`.
+    The second result is the value of `_Rule.has_effect`.
     """
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
@@ -882,7 +893,7 @@ def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
 
 
 def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
-    """Return whether moving `one` keeps the axis of `other`."""
+    """Return whether the axis of `other` stays fixed when joint `one` moves."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"
     if {one.kind, other.kind} - {"turns", "prismatic"}:

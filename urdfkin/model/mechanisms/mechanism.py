@@ -62,12 +62,13 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: Largest perpendicular component of a parallel unit vector.
+#: A unit vector counts as parallel to an axis if its perpendicular component is
+#: smaller than this.
 PARALLEL_TOLERANCE = 1e-12
 
 
 def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
-    """Return the motion exp(S t)."""
+    """Return the motion exp(S t) (4, 4) for a value t (rad or m)."""
     if not turns:
         return pose(p=screw.direction * value)
     R = rotation_about(screw.direction, value)
@@ -75,7 +76,13 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 
 
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion, its tilt and its shift."""
+    """Return the smallest motion from one joint axis to another.
+
+    The motion contains no rotation about the axis, and no shift along the axis.
+
+    Returns:
+        (4, 4) motion, its tilt (rad), and its shift (m), which is 0 for prismatic joints.
+    """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
     if turns:
@@ -85,7 +92,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the smallest rotation and angle.
+    """Return the smallest rotation from u to v, and its angle (rad).
 
     The arguments are unit vectors.
     """
@@ -111,13 +118,13 @@ def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def angle_about(u: FloatArray, R: FloatArray) -> float:
-    """Return the angle about u that best approximates R."""
+    """Return the angle (rad) of the rotation about u that is nearest to R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle about u from x to y.
+    """Return the angle (rad) about u from x to y.
 
     The result is None if x or y is parallel to u.
     """
@@ -138,7 +145,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """Conversion of a planar or floating joint.
 
-    See *Planar and floating joints* above.
+    The module docstring defines M and N under *Planar and floating joints*.
 
     Attributes:
         before: Rigid motion M (4, 4).
@@ -151,14 +158,14 @@ class JointTransform:
     back: bool = False
 
     def __call__(self, kind: JointKind, coordinates: FloatArray) -> FloatArray:
-        """Convert coordinates from A to B."""
+        """Convert coordinates of A's joint to coordinates of B's joint."""
         P = pose_of(kind, coordinates)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether the joint allows this conversion.
+        """Return whether M and N are rigid motions, and the joint can reach M P N.
 
-        The test uses two poses P.
+        The method checks two poses P.
         """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
@@ -203,6 +210,7 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def planar_angle(P: FloatArray) -> FloatArray:
+    """Return the angle (rad) of the nearest rotation about z."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
@@ -211,7 +219,7 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 
 
 def planar_counterpart(M: FloatArray) -> FloatArray:
-    """Return a motion N that makes M P N planar.
+    """Return a motion N for which M P N is planar for every planar pose P.
 
     M must keep or reverse the normal of the plane.
 
@@ -257,12 +265,14 @@ class Mechanism:
     """Bodies and joints in the zero configuration.
 
     Args:
-        separating_joints: Fixed joints that move in the other model.
-        labels: The links' names by default.
+        tree: The robot.
+        separating_joints: Indices of fixed joints that move in the other model.
+        labels: Label of each link, by default its name. Links with equal labels are paired.
 
     Attributes:
-        zero_poses: (4, 4) poses in the root frame.
-        lengths: Path lengths from the root, m.
+        zero_poses: (4, 4) pose of each link in the root frame.
+        lengths: Length (m) of the path from the root to each link.
+        orders: Joint names in the new order, for each call of `reorder`.
     """
 
     def __init__(
@@ -299,7 +309,7 @@ class Mechanism:
         return known
 
     def reorder(self, names: Sequence[str]) -> Mechanism:
-        """Return a copy in another order.
+        """Return a copy with consecutive joints in another order.
 
         `allows_order` must be true. Links whose pose depends on the order are omitted.
         """
@@ -317,9 +327,9 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the order keeps the motion.
+        """Return whether the joints give the same motion in the order `names`.
 
-        The joints must be consecutive.
+        The result is false if the joints are not consecutive.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -363,7 +373,7 @@ class Mechanism:
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
         """Return whether two joints commute.
 
-        Two prismatic joints always commute. Two revolute joints need equal axes.
+        Two prismatic joints always commute. Two revolute joints need axes on the same line.
         A revolute and a prismatic joint need parallel axes.
         """
         kinds = [self.joint(edge).kind for edge in (one, other)]
@@ -391,10 +401,10 @@ class Mechanism:
     def rounding(self) -> float:
         """Rounding error (rad) of the links' rotations.
 
-        The error of positions is this error times `size`.
+        The error (m) of the links' positions is this error times `size`.
         The program that wrote the file rounded each joint's constant transform and axis.
         The parser rounds these numbers again. A program that merges fixed joints rounds less often.
-        The error includes the tilt between Pinocchio's and the URDF's axes.
+        The error includes the angles between Pinocchio's and the URDF's axes.
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
@@ -404,7 +414,7 @@ class Mechanism:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """The largest angle (rad) and distance (m) from rounding."""
+    """The largest angle (rad) and distance (m) that rounding can cause."""
 
     angle: float
     distance: float
@@ -420,7 +430,7 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
 
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
-    """Return the length that converts angles to distances."""
+    """Return the length (m) that converts angles to distances."""
     return max(a.size, b.size, MIN_ROBOT_SIZE)
 
 
@@ -452,20 +462,25 @@ class MatchedJoints:
     """Two matched joints.
 
     The value of B's joint is sense * (value of A's joint) + offset.
+    The module docstring defines L, S and S'.
 
     Attributes:
-        kind: "turns", "prismatic", "planar" or "floating".
-        previous: Previous joint pair, or -1.
+        a: Index of A's joint.
+        b: Index of B's joint.
+        kind: "turns" (revolute), "prismatic", "planar" or "floating".
+        previous: Index of the previous joint pair on the path from the base, or -1.
+        sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
-        before: Rigid motion L (4, 4).
+        before: Rigid motion L (4, 4) before B's joint.
         axis_a: Screw S; exp(S t) moves the body farther from the base.
-            If A's joint is fixed, this is B's screw.
-        axis_b: Screw S'. If S' = S, this is the object `axis_a`.
-        tilt: Angle between axes or normals, rad.
-        shift: Distance between axes or origins, m.
-        kind_difference: "a" or "b" if only the joint of this model is fixed.
-            "kind" for different kinds, and for reversed joints without `conversion`. Otherwise "".
-        conversion: None for equal coordinates.
+            If A's joint is fixed, `axis_a` is the screw of B's joint.
+        axis_b: Screw S'. If S' = S, `axis_b` is the same object as `axis_a`.
+        tilt: Angle between axes, or between normals of planar joints, rad.
+        shift: Distance between axes, or between origins of planar or floating joints, m.
+        kind_difference: "a" if only A's joint is fixed, and "b" if only B's joint is fixed.
+            "kind" for moving joints of different kinds, and for planar or floating joints
+            that one model reverses, without `conversion`. Otherwise "".
+        conversion: Conversion of a planar or floating joint with different coordinates, else None.
     """
 
     a: int
@@ -492,12 +507,15 @@ class FramePair:
     """Two matched links.
 
     Attributes:
-        previous: Last joint pair, or -1.
-        zero_pose: (4, 4) pose of A's link.
-        end: Rigid motion L (4, 4).
+        a: Index of A's link.
+        b: Index of B's link.
+        previous: Index of the last joint pair on the path to the links, or -1.
+        zero_pose: (4, 4) pose of A's link in the zero configuration.
+        end: Rigid motion L (4, 4) after the last joint; the module docstring defines L.
         tilt: Angle between the frames, rad.
         shift: Distance between the origins, m.
-        tool: (4, 4) pose of B's link in A's link; usually the identity.
+        tool: (4, 4) pose of B's link in the frame of A's link, for different end-effector frames.
+            Otherwise the identity.
     """
 
     a: int
@@ -510,7 +528,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy with the difference in `tool`."""
+        """Return a copy that stores the frames' difference in `tool`."""
         tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -524,11 +542,11 @@ class Alignment:
     """The result of aligning two mechanisms.
 
     Attributes:
-        base: Links where the search started.
-        X: (4, 4) pose of B's root in A's root.
+        base: Indices of the links of A and B where the search started.
+        X: (4, 4) pose of B's root in A's root frame.
         steps: Joint pairs, outwards from the base.
-        match_count: Number of pairs that agree.
-        max_difference: Largest value of tilt * size_of + shift, m.
+        match_count: Number of joint pairs and link pairs that agree.
+        max_difference: Largest tilt * size_of + shift of all joint pairs and link pairs, m.
     """
 
     a: Mechanism
@@ -544,7 +562,7 @@ class Alignment:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all joints match without differences."""
+        """Whether all joints are matched, and all matched joints and links agree."""
         alike = not any(step.kind_difference for step in self.steps)
         return alike and not (self.max_difference or self.only_a or self.only_b)
 
@@ -560,9 +578,9 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) of the pairs.
+        """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
-        Both are 0 without differences. Pairs of links without child joints are ignored.
+        Both are 0 if no pair differs. A link pair is ignored if neither link has a child joint.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
@@ -587,7 +605,11 @@ class Alignment:
         )
 
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield joint pairs with exchangeable partners."""
+        """Yield two joint pairs whose partners can be exchanged.
+
+        Both pairs have the same kind and the same previous pair, and lie on paths to differences.
+        The names of A's two joints occur neither in B nor in `name_map`.
+        """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
@@ -598,9 +620,9 @@ class Alignment:
                 yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
-        """Return frame pairs of given links.
+        """Return a `FramePair` for each pair of link indices.
 
-        Links of unmatched bodies are omitted.
+        A pair is omitted if its two bodies have no matched links.
         """
         matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
@@ -631,7 +653,7 @@ class Alignment:
 
     @property
     def depth(self) -> int:
-        """Longest path in joints, plus 1."""
+        """Number of joint pairs on the longest path from the base, plus 1."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
@@ -640,10 +662,11 @@ class AlignmentChoices:
     """Prescribed values for an alignment.
 
     Attributes:
-        base: None if the search chooses.
-        X: (4, 4) pose of B's root.
-        zeros: Sign and zero offset, by A's joint name. The default is (1, 0).
-        orders: New orders of B's joints.
+        base: Names of the first links of A and B; None if the search chooses the first bodies.
+        X: (4, 4) pose of B's root in A's root frame.
+        zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
+        conversions: Conversions of planar and floating joints, by A's joint name.
+        orders: Each entry lists consecutive joints of B in their new order.
     """
 
     base: tuple[str, str] | None = None
@@ -653,7 +676,7 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: Equal root poses, and equal coordinates of each joint.
+#: Choices with equal root poses and equal joint coordinates.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -674,7 +697,7 @@ class LinearFunction:
     def evaluate(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
         """Evaluate the function.
 
-        A missing variable is 0.
+        A variable that is not in `values` is 0.
         """
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
@@ -688,19 +711,18 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: Joint value with the sign and zero of B's URDF:
+    #: Value of B's joint with the sign and zero of B's URDF:
     #: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
-    #: If only rounding separates the functions, `b` is `a`, and
-    #: `rounding` (rad or m) is max(0, D - E).
-    #: D: absolute difference of the constants of both functions.
-    #: E is the rounding error of one joint.
-    #: Otherwise, `rounding` is 0.
+    #: If the computed functions differ by rounding only, `b` is set to `a`,
+    #: and `rounding` (rad or m) is max(0, D - E). Otherwise, `rounding` is 0.
+    #: D: absolute difference of the constants of both computed functions.
+    #: E: rounding error of one joint.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """The common variable, or None."""
+        """The variable that moves the joints; None for two different variables."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -711,10 +733,11 @@ class Variables:
     """The values of all matched joints.
 
     Attributes:
-        pairs: None for planar, floating and unlike moving joints.
-        ranges: In rad or m. Infinite without limits.
-        rules: Pairs with different mimic rules.
-        coordinates: B's coordinates, by joint name.
+        pairs: The values of each joint pair. None for planar and floating joints, and for moving
+            joints of different kinds.
+        ranges: Range of each variable, rad or m; infinite without limits.
+        rules: Indices of the joint pairs with different mimic rules.
+        coordinates: Each coordinate of B as a function of a variable, by B's joint name.
     """
 
     pairs: tuple[MatchedValues | None, ...]
@@ -729,6 +752,7 @@ class Variables:
         return ends[0], ends[1]
 
     def value_difference(self, pair: MatchedValues) -> float:
+        """Return the largest difference (rad or m) of the joint's values in A and B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
                 LinearFunction(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
@@ -752,7 +776,7 @@ class _VariablesBuilder:
         self.depth = alignment.depth
 
     def _find_coordinates(self) -> dict[str, LinearFunction]:
-        """Express B's coordinates by variables."""
+        """Express each coordinate of B by a variable."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         followers_last = sorted(own, key=self._is_mimic_in_a)
@@ -823,7 +847,9 @@ class _VariablesBuilder:
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """Return the range of each variable.
 
-        The limits of mimic joints are ignored, because the joints follow their rules.
+        The range is the intersection of the limits of all joints that the variable moves.
+        If this intersection is empty or a single value, the range is given by A's limits.
+        The limits of mimic joints are ignored: mimic joints follow their rules beyond these limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

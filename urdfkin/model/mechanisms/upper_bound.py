@@ -72,16 +72,17 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray, pose
 
 _FULL_TURN = 2.0 * math.pi
-#: Corners of a polygon around a circle, 0.1 % outside it.
+#: Number of corners of a polygon around a circle; the corners are 0.1 % outside the circle.
 _CORNERS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Directions on the surface of a cube.
+    """Directions, represented by grid points on the surface of a cube.
 
     Attributes:
-        segments: Polygon sides for a full circle.
+        cells: Number of cells along each edge of the cube.
+        segments: Number of sides of the polygon that contains a full circle of directions.
     """
 
     cells: int
@@ -116,14 +117,14 @@ def _points(cells: int) -> FloatArray:
 class Support:
     """The support function of a set of points.
 
-    `values` contains upper bounds on h (m).
+    `values` contains upper bounds (m) on h at the grid points.
     """
 
     grid: Grid
     values: FloatArray
 
     def evaluate(self, u: FloatArray) -> FloatArray:
-        """Return upper bounds on h(u).
+        """Return upper bounds (m) on h(u).
 
         Args:
             u: (..., 3) vectors of any length.
@@ -153,7 +154,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Apply all rotations from `low` to `high` (rad)."""
+        """Return the support function after all rotations from `low` to `high` (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -161,12 +162,13 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return h after each rotation.
+        """Return h after each rotation of the set of points.
 
         Args:
             axis: Unit vector.
             angles: (k,) angles, rad.
-            factors: Scales of the parts perpendicular to the axis.
+            factors: Multiplier for each angle or for all angles. A multiplier scales the part of
+                each grid point that is perpendicular to the axis.
 
         Returns:
             (k, n) values at the grid points.
@@ -178,7 +180,7 @@ class Support:
         return self.evaluate(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Apply all translations from `low` to `high` (m)."""
+        """Return the support function after all translations from `low` to `high` (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -188,14 +190,14 @@ class Support:
         return Support(self.grid, self.evaluate(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
-        """Bound the distance from a line."""
+        """Return an upper bound (m) on the distance of the points from a screw's line."""
         x, y, _ = rotation_with_z_axis(screw.direction).T
         corners = _corners(0.0, _FULL_TURN, _CORNERS)
         u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
         return float(max((self.evaluate(u) - u @ screw.point).max(), 0.0))
 
     def max_distance(self) -> float:
-        """Bound the distance from the origin.
+        """Return an upper bound (m) on the distance of the points from the origin.
 
         For a grid cell with the corners g_k:
 
@@ -223,7 +225,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     """Enclose an arc of the unit circle in a polygon.
 
     Returns:
-        Angle (rad) and radius per corner.
+        Angle (rad) of each corner, and its distance from the circle's centre.
     """
     if high - low >= _FULL_TURN:
         half = math.pi / segments
@@ -236,23 +238,24 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: `FINE_GRID` gives smaller bounds, but takes longer.
+#: `FINE_GRID` gives smaller bounds than `COARSE_GRID`, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
-#: Maximum number of sample values of a revolute joint.
-#: For a larger range, the angles in A and B count as independent.
+#: Maximum number of sample values of a revolute joint's variable.
+#: If a range needs more samples, the angles in A and B count as independent.
 MOST_VALUES = 1024
 
 
 def upper_bounds(
     alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE_GRID
 ) -> tuple[float, float]:
-    """Bound the difference of a frame's poses.
+    """Return upper bounds on the difference of a frame's poses in A and B.
 
     The bounds hold for all joint values within the limits.
 
     Returns:
         Distance (m) and angle (rad).
-        Both are 0 if nothing differs. A result is inf if no bound is proven.
+        Both are 0 if nothing differs on the path. A result is inf if no bound is proven.
+        Matched moving joints of different kinds give inf.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -269,7 +272,7 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return a frame's path from the first different joint."""
+    """Return a frame's joint pairs and their values, beginning with the first joint that differs."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -286,9 +289,9 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Bound the angle between two rotations.
+    """Return an upper bound (rad) on the angle between the frame's rotations in A and B.
 
-    The bound is the sum of the largest angles of all differences.
+    The bound is the sum of the largest angles that the differences can cause.
     """
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
@@ -322,7 +325,7 @@ def _distance_bound(
 
 
 def _displacement_bound(L: FloatArray, reach: float) -> float:
-    """Bound the displacement of a point y by L.
+    """Return an upper bound (m) on the displacement of a point y by L.
 
     For L = (R, p) and |y| <= `reach`:
 
@@ -338,6 +341,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+    """Return the support functions of d and y at the frame."""
     p, end = frame.zero_pose[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point_support(grid, y - p), point_support(grid, y)
@@ -346,7 +350,8 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    # Planar and floating joints allow every direction of d.
+    """Return the support functions of d and y after a joint's motion and L."""
+    # Planar and floating joints rotate without limits, so they allow every direction of d.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.max_distance() * d.grid.lengths)
@@ -363,6 +368,7 @@ def after_joint(
 
 
 def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
+    """Return the support functions of d and y after the rigid motion L."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -372,7 +378,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return d after a joint, without the motion L."""
+    """Return the support function of d after a joint's motion, without the motion L."""
     same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis_a.direction, np.zeros(3))
@@ -408,10 +414,10 @@ def _prismatic_difference(
 
 
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Sample the variable of two revolute joints.
+    """Return samples of the variable that moves two matched revolute joints.
 
     Returns:
-        None for independent angles.
+        (n,) samples; None if the angles must be treated as independent.
     """
     if (name := pair.variable) is None:
         return None
@@ -428,7 +434,7 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
 def _common_difference(
     step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
 ) -> Support:
-    """Return d after two joints with a common variable.
+    """Return the support function of d after two matched revolute joints with a common variable.
 
     Definitions and bounds:
 
@@ -446,7 +452,7 @@ def _common_difference(
                         |P' - P| <= |u' - u|
                         perpendicular part of x' - x = offset of the axes
 
-        m, m':          different slopes of t and t'
+        m, m':          slopes of t and t', if they differ
         r, r':          largest distances of y from the axes
                         |second derivative| <= m^2 r + m'^2 r'
     """
@@ -480,7 +486,7 @@ def _common_difference(
 def _independent_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
 ) -> Support:
-    """Return the change of d for independent angles.
+    """Return the support function of the change of d by a revolute joint with independent angles.
 
     Definitions and bounds:
 
@@ -510,12 +516,12 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Bound the second derivatives of D.
+    """Return upper bounds on the second derivatives of D with respect to the variables.
 
-    All bounds are inf if a relevant joint pair has different variables or slopes.
+    All bounds are inf if a joint pair with an effect on D has different variables or slopes.
 
     Returns:
-        n names and (n, n) bounds (m).
+        n names of variables, and (n, n) bounds (m).
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -524,7 +530,7 @@ def curvature(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For a prismatic joint i, `bound` can be 0 for different values.
+        # For a prismatic joint i, `bound` can be 0 although its values in A and B differ.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:
@@ -540,10 +546,10 @@ def curvature(
 def _second_derivatives(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
-    """Bound each second derivative of D.
+    """Yield upper bounds on the second derivatives of D with respect to two joints.
 
     Yields:
-        Two joints i and j <= i, and the bound.
+        Indices i and j <= i of the joints, and the bound.
     """
     free = [_as_free_vectors(step) for step in steps]
     d, y = start_at_frame(frame, COARSE_GRID)
@@ -565,7 +571,10 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
-    """Bound the length of d at the base."""
+    """Return an upper bound on the length of d at the base.
+
+    `vectors` contains d and y at the last joint, without the motion L of this joint.
+    """
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -578,7 +587,7 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return derivatives of d and y.
+    """Return bounds on the derivatives of d and y with respect to a joint's value.
 
     The motion L is not included.
     """
@@ -606,7 +615,7 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Remove translations, which do not affect free vectors."""
+    """Return a joint pair without translations, which do not affect free vectors."""
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -616,9 +625,10 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the joints that affect the length of D.
+    """Return the matched joints, and their values, that affect the length of D.
 
-    The variable of an earlier joint may also move a later joint.
+    The result begins at the first difference, or at an earlier joint that shares
+    a variable with later joints.
     """
     steps, pairs = (
         alignment.path(frame.previous),
