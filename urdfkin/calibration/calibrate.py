@@ -97,13 +97,14 @@ class Calibration:
         base_tool_fit: A fit of base and tool alone.
         outliers: Indices of the outlier poses.
         fit_without_outliers: The fit without the outliers.
-        poorly_observable: Maps the index of each poorly observable parameter to u_measured / u_random. These
-            are the uncertainties at the measured configurations and at equally many random configurations.
+        poorly_observable: Maps the index of each poorly observable parameter to u_measured / u_random. The
+            first is the uncertainty at the measured configurations. The second is the uncertainty at equally
+            many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the others keep their original values.
         selected_parameters: Indices of the parameters that `written_fit` fits.
-        plausibility: The reasons why the fit is refused.
+        plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
 
     robot: Robot
@@ -127,7 +128,7 @@ class Calibration:
 
     @cached_property
     def changes(self) -> FloatArray:
-        """(p,) changes, m and rad; 0 for fixed parameters."""
+        """(p,) changes of the parameters, m and rad; 0 for fixed parameters."""
         return self._change(self.full_fit)
 
     def _change(self, fit: Fit | None) -> FloatArray:
@@ -248,14 +249,15 @@ def calibrate(
             "tool": the pose of the target on the tip. "offsets": the zero positions of the joints. "origins":
             six numbers of each joint origin, or all cells of a table. "gains": the scale factors of the joint
             values.
-        noise: Standard deviations of a position coordinate (m) and of a rotation about an axis (rad). None:
-            the noise is estimated from the residuals.
+        noise: Standard deviations of the measurements: of a position coordinate (m) and of a rotation about
+            an axis (rad). None: the noise is estimated from the residuals.
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
         full_poses: Whether you will measure full poses, not only positions. Without effect if `poses` is
             given.
         radians: Whether joint angles of more than one turn are radians, not degrees.
-        force: Whether to return a fit that is not plausible. Without effect if joint values look like
-            degrees. Convert such values, or pass `radians=True` for values in radians.
+        force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
+            Without effect if joint values look like degrees. Convert such values, or pass `radians=True` for
+            values in radians.
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
@@ -307,9 +309,9 @@ def fit_model(
     write_all: bool = True,
     check: bool = True,
 ) -> Calibration:
-    """Calibrate a model, plausible or not.
+    """Return the calibration of a model, even if the fit is not plausible.
 
-    `calibrate` describes the arguments.
+    `calibrate` describes the arguments. Without `check`, `plausibility` is empty.
     """
     robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
@@ -349,7 +351,7 @@ def fit_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return the original parameters.
+    """Return the parameters (p,) of the original model.
 
     If the tool is fitted, `_TARGET_DIVISORS` defines the target's position.
     """
@@ -370,7 +372,7 @@ def _check_measured(
     """Check the measured data.
 
     Returns:
-        (samples, n) coordinates, and poses.
+        (samples, n) coordinates of the path, and the measured poses.
     """
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
@@ -462,9 +464,10 @@ def _add_identifiable(
     stated: Noise | None,
     full_fit: Fit,
 ) -> tuple[Identification, Fit]:
-    """Add parameters that reduce the residuals.
+    """Add parameters that are identifiable at the fitted values and significantly reduce the residuals.
 
-    The original geometry is often special, with fewer identifiable parameters.
+    The original geometry is often special, with fewer identifiable parameters. For example, the tip can lie
+    on the last joint's axis.
     """
     again = identify(
         model,
@@ -522,7 +525,7 @@ def _find_poorly_observable(
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio.
 
-    A URDF cannot contain base, tool or gains.
+    A URDF cannot contain base, tool or gains. Therefore, these parameters are 0 in the comparison.
     """
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:

@@ -63,9 +63,10 @@ The steps end when no outlier is left.
     R_B^T R_Mi = R_i R_X              linear in R_B and R_X, whose entries form the null vector (Shah, 2013)
     p_Mi = R_B (R_i x + p_i) + b      linear in x and b
 
-If only positions are measured, base and target on the tip are unknown. A known target position determines the
-base's rotation directly. A known rotation of the base makes the equations for both positions linear. The
-module therefore computes the rotation and the two positions alternately.
+If only positions are measured, the base and the target's position on the tip are unknown. A known target
+position determines the base's rotation directly. A known rotation of the base makes the equations for the
+positions of base and target linear. The module therefore computes the rotation and the two positions
+alternately.
 """
 
 from __future__ import annotations
@@ -151,7 +152,7 @@ def identify(
         model: The model.
         joint_values: (s, n) joint values.
         full_poses: Whether full poses are measured.
-        parameter_values: (p,) parameter values.
+        parameter_values: (p,) parameter values; those of the original model when None.
     """
     J = stack_jacobian(model, joint_values, full_poses=full_poses, parameter_values=parameter_values)
     error = np.full_like(J, model.chain.rounding_bound(joint_values))
@@ -233,9 +234,9 @@ class Measurements:
     """Measured poses or positions.
 
     Attributes:
-        joint_values: (s, n) values, rad or m.
+        joint_values: (s, n) joint values of the path, rad or m.
         p: (s, 3) positions in the base, m.
-        R: (s, 3, 3) orientations; None for positions only.
+        R: (s, 3, 3) orientations in the base; None if only positions were measured.
     """
 
     joint_values: FloatArray
@@ -302,7 +303,7 @@ class Fit:
 
     @property
     def noise_ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise."""
+        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct."""
         if not self.has_redundancy:
             return math.nan
         whitened = self.residuals / self.noise.deviations(self.residuals.shape[1] == 6)
@@ -349,7 +350,7 @@ def fit_parameters(
     noise: Noise | None,
     parameter_values: FloatArray,
 ) -> Fit:
-    """Fit the free parameters.
+    """Fit the parameters with the indices `free_parameters`.
 
     The start values are `parameter_values` (p,).
     """
@@ -380,7 +381,7 @@ def fit_parameters(
 def _estimate_noise(fit: Fit, model: CalibrationModel, measurements: Measurements) -> Noise:
     """Estimate the noise from the residuals.
 
-    A lower limit avoids division by 0.
+    The estimate is at least the rounding error, because an estimate of 0 would cause a division by 0.
     """
     rounding = model.chain.rounding_bound(measurements.joint_values)
 
@@ -473,10 +474,10 @@ def reject_outliers(
 def select_significant(
     changes: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 ) -> NDArray[np.bool_]:
-    """Select significant changes by backward elimination.
+    """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step resets one parameter. The reset can make a correlated parameter significant. `fixed` parameters
-    are always selected. Unknown covariances are inf.
+    Each step resets the least significant parameter. The reset can make a correlated parameter significant.
+    `fixed` parameters are always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -520,10 +521,12 @@ _LARGEST_SPREAD = 100.0
 
 
 def estimate_start_values(model: CalibrationModel, measurements: Measurements) -> FloatArray:
-    """Return start values for a fit.
+    """Return start values of all parameters for a fit.
+
+    Base and tool are computed from the measured poses. The other parameters have their original values.
 
     Returns:
-        (p,) values.
+        (p,) start values.
     """
     parameter_values = model.chain.initial_values.copy()
     ends = {parameter.element for parameter in model.chain.parameters if parameter.is_base_or_tool}

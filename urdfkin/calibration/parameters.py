@@ -70,12 +70,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ParametricMotion(ElementaryMotion):
-    """A motion by a parameter or a joint value.
+    """A motion whose angle or length is a parameter or the value of a joint.
 
     Attributes:
-        parameter: Index of the parameter or gain; None without a gain.
-        joint: Index of the joint, if any.
-        sense: -1 for a reversed motion, else 1.
+        parameter: Index of the parameter. For the motion of a joint: index of the gain; None without a gain.
+        joint: Index of the joint; None for the motion of a parameter.
+        sense: -1 if the path leads from child to parent, or if the row subtracts the joint's value. Else 1.
     """
 
     parameter: int | None
@@ -85,7 +85,7 @@ class ParametricMotion(ElementaryMotion):
 
 @dataclass(frozen=True, eq=False)
 class ParametricChain:
-    """A path with parameters.
+    """The pose of a tip as a function of parameters and joint values.
 
     Each parameter occurs once in the path.
 
@@ -103,7 +103,10 @@ class ParametricChain:
 
     @property
     def characteristic_length(self) -> float:
-        """Sum (m) of the model's lengths, or 1 if the sum is 0."""
+        """Sum (m) of the model's lengths, or 1 if the sum is 0.
+
+        An angle times this length is a distance.
+        """
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -125,7 +128,7 @@ class ParametricChain:
         )
 
     def frames(self, joint_values: FloatArray, parameter_values: FloatArray) -> FloatArray:
-        """Return the poses after each transform.
+        """Return the poses after each transform of the path.
 
         Returns:
             (s, steps, 4, 4) poses; the last pose is the tip's.
@@ -138,9 +141,9 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return tip poses and their Jacobian.
+        """Return tip poses and their Jacobian by the parameters.
 
-        `frames` can contain the result of the method `frames`.
+        `frames` can contain the result of the method `frames` for the same arguments.
 
         Returns:
             (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
@@ -160,10 +163,10 @@ class ParametricChain:
     def _displacements(
         self, joint_values: FloatArray, parameter_values: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the displacements of the motions.
+        """Return the angle or length of each motion.
 
         Returns:
-            (s, motions) displacements, and their derivatives by the parameters.
+            (s, motions) angles or lengths, and their derivatives by the parameters.
         """
         factors = np.empty((len(joint_values), len(self._parametric_motions)))
         numbers = np.ones(len(self._parametric_motions))
@@ -174,7 +177,7 @@ class ParametricChain:
         return factors * numbers, factors
 
     def rounding_bound(self, joint_values: FloatArray) -> float:
-        """Bound the rounding error of `poses_and_jacobian`.
+        """Bound the rounding error of each number from `poses_and_jacobian`.
 
         Returns:
             Bound, m; divide by `characteristic_length` for radians.
@@ -223,7 +226,7 @@ class CalibrationModel:
     """A parametric chain with grouped parameters.
 
     Attributes:
-        groups: Parameter indices in order of preference.
+        groups: Parameter indices of the base, the tool and each joint, in order of preference.
     """
 
     chain: ParametricChain
@@ -243,7 +246,7 @@ class CalibrationModel:
     def origins(self, parameter_values: FloatArray) -> dict[str, FloatArray]:
         """Return the changed joint origins.
 
-        The origin of a locked joint excludes the locked value.
+        The origin of a locked joint does not include the value at which the joint is locked.
 
         Returns:
             (4, 4) origins by joint name.
@@ -283,7 +286,7 @@ class CalibrationModel:
     def _change(
         self, element: str, parameter_values: FloatArray, *, is_base_or_tool: bool = False
     ) -> FloatArray:
-        """Return the motion of an element."""
+        """Return the (4, 4) motion by the six parameters of a joint, the base or the tool."""
         parameters = enumerate(self.chain.parameters)
         values = {
             p.name: float(parameter_values[k])

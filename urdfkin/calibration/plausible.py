@@ -112,9 +112,10 @@ class FitWithData:
 
     @cached_property
     def reach(self) -> float:
-        """Reach of the original model, m.
+        """Reach of the original model at the measured configurations, m.
 
-        The reach is the tip's largest distance from the base or a joint axis.
+        The reach is the tip's largest distance from the base or a joint axis, and at most the sum of the
+        model's lengths.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -171,7 +172,7 @@ class FitWithData:
             yield f"the fit scales the values of joint {_join_names(gained.values())}"
 
     def half_turn_zeros(self) -> list[str]:
-        """Return joints whose zero changed by half a turn.
+        """Return the joints whose zero positions changed by about half a turn.
 
         A wrong sign of the next joint can cause such a change.
         """
@@ -278,7 +279,7 @@ class _Correction:
     """Configurations after correcting one mistake.
 
     Attributes:
-        first: Index of the first row's pose.
+        first: Index of the pose that belongs to the first row of `q`.
     """
 
     reason: str
@@ -335,9 +336,9 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
-    """Reverse signs one by one while the error decreases.
+    """Reverse the signs of joints one by one while the error decreases.
 
-    None: fewer than two signs are reversed.
+    The result is None if fewer than two signs are reversed.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf

@@ -11,7 +11,7 @@ The order of the rotations is ambiguous:
     driver               R = Rx(roll) Ry(pitch) Rz(yaw)      Eigen's `eulerAngles(0, 1, 2)`
     ROS description      R = Rz(yaw) Ry(pitch) Rx(roll)      angles copied into a URDF
 
-    angles: a quarter turn, a small angle (1e-5 to 1e-4 rad), and 0
+    example: the angles are a quarter turn, a small angle (1e-5 to 1e-4 rad), and 0
     difference of the two products: about 1.4 times the small angle
 
 With the order "driver", the result agrees with the robot's controller. With the order "urdf", the result
@@ -66,9 +66,9 @@ _DISTANCE_SAMPLES = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read joint origins from YAML.
+    """Read joint origins from a YAML file.
 
-    The file is the driver's, or a `default_kinematics.yaml`.
+    The file is the calibration file of the driver, or a `default_kinematics.yaml`.
 
     Returns:
         (4, 4) origins by joint name.
@@ -118,9 +118,10 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 
 
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
-    """Apply a calibration file to a URDF.
+    """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all joints turn about z, the origins are copied. For other URDFs, the joint origins are fitted.
+    If all joints turn about z, the origins are copied. For other URDFs, the joint origins are fitted. The
+    poses of `tool0` in `base` are then those of the calibrated arm.
     """
     robot = as_robot(robot)
     origins = read_calibration(path, order)
@@ -178,7 +179,7 @@ def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare the URDF with the calibration."""
+    """Compare poses of the new URDF with poses of the calibration file."""
     written = result.new_robot
     q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
@@ -195,7 +196,7 @@ def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) ->
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest sampled displacement between two arms.
+    """Return the largest sampled displacement between the `tool0` frames of two arms.
 
     The returned angle is 2 sin(angle / 2), which is accurate only for small angles.
 

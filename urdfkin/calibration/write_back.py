@@ -37,7 +37,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
 
     Args:
         data: The original URDF.
-        origins: (4, 4) origins by joint name.
+        origins: The new origin (4, 4) of each changed joint, by joint name.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -69,7 +69,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Return three numbers as text."""
+    """Return three numbers as text; a number equal to `old` up to rounding keeps its digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
@@ -81,7 +81,7 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
 
 
 def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
-    """Return the roll, pitch and yaw nearest to `old`.
+    """Return the roll, pitch and yaw (3,) of a rotation that are nearest to the angles `old`.
 
     >>> from urdfkin.kinematics.rotation import rotation_from_rpy
     >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
@@ -106,7 +106,7 @@ class UpdatedURDF:
     Attributes:
         robot: The robot before the change.
         origins: The new origin (4, 4) of each changed joint, by joint name.
-        certificate: Result of Pinocchio's check; None if not checked.
+        certificate: Result of Pinocchio's check of the new URDF; None if not checked.
     """
 
     robot: Robot

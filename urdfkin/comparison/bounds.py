@@ -16,7 +16,7 @@ divides the space of all variables into boxes, and bounds the distance in each b
     M_ij                          bound on the second derivative of D with respect to variables i and j,
                                   for every configuration (`curvature`)
 
-    |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
+    |D(q)| <= max over |x_i| <= h_i of |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
 
 If the bound of a box is at most the target, the box is finished. Otherwise, the box is halved.
 """
@@ -46,15 +46,15 @@ from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
 RANDOM_SAMPLES = 512
-#: Number of random configurations at ends of the joint ranges.
+#: Number of random configurations with each variable at an end of its range.
 CORNER_SAMPLES = 128
-#: Number of sampled configurations at which a search starts.
+#: Number of sampled configurations per frame at which the search starts.
 STARTING_POINTS = 4
 #: Number of values per coordinate in one step of the search.
 VALUES_PER_STEP = 13
 #: Number of frames that are searched in one batch.
 FRAMES_PER_BATCH = 24
-#: Width of the search interval in each round, relative to the range.
+#: Width of the search interval in each round, relative to the coordinate's range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that returns the poses (n, frames, 4, 4) at q.
@@ -65,7 +65,8 @@ class DistanceSearch:
     """Search for the largest frame distances.
 
     Args:
-        as_written: Whether poses are relative to the root links.
+        as_written: True: B's root has a constant pose in A's root frame. False: B's base link has a constant
+            pose in the frame of A's base link.
     """
 
     def __init__(
@@ -81,14 +82,14 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose of B's base link in A's root frame at zero.
+        #: (4, 4) pose of B's base link in A's root frame, for A's zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
         #: Whether base link and root link are one rigid body, for A and B.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
         #: Whether a joint between root and base link changes the distances.
-        #: The bounds of `upper_bounds` and `tighten` do not hold then.
+        #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -107,8 +108,8 @@ class DistanceSearch:
         """Return configurations of A and B.
 
         Args:
-            z: (n, variables) values.
-            random_free_joints: Whether A's planar and floating joints are random.
+            z: (n, variables) values of the variables.
+            random_free_joints: Whether A's planar and floating joints are random instead of neutral.
 
         Returns:
             (n, nq) configurations of both robots.
@@ -134,7 +135,7 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Check correspondence and joint ranges.
+        """Check whether two configurations correspond and are within the joint ranges.
 
         Args:
             q_a: (1, nq) configuration of A.
@@ -202,7 +203,7 @@ class DistanceSearch:
         """Return distances at sampled values.
 
         Returns:
-            (n, frames) distances, m, and (n, variables) values.
+            (n, frames) distances, m, and (n, variables) values of the variables.
         """
         low, high = self.ends.T
         z = self.random_values(RANDOM_SAMPLES)
@@ -229,7 +230,7 @@ class DistanceSearch:
 
         Args:
             frames: Matching frames.
-            z: (frames, starting points, variables) values.
+            z: (frames, starting points, variables) values at which the search starts.
         """
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
@@ -262,7 +263,7 @@ class DistanceSearch:
         """Return each frame's distances at its own configurations.
 
         Args:
-            z: (frames, starting points, values, variables).
+            z: (frames, starting points, values, variables) different configurations for each frame.
             frames: Matching frames.
 
         Returns:
@@ -304,14 +305,14 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 
 
 #: Maximum number of boxes in memory.
-#: With this number of boxes, `tighten` takes one or two seconds.
+#: With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
-#: Boxes per batch; more Jacobians would take gigabytes.
+#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes.
 BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Upper bounds on distances in boxes.
+    """Upper bounds on a frame's distance in boxes of configurations.
 
     Args:
         names: Every variable that changes the distance.
@@ -341,7 +342,7 @@ class BoxBounds:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Return upper bounds on |D + sum_i D_i x_i|.
+        """Return upper bounds on |D + sum_i D_i x_i| for |x_i| <= h_i.
 
         Args:
             c: (n, variables) box centers.
@@ -394,17 +395,17 @@ class BoxBounds:
 def tighten(
     search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MAX_BOXES
 ) -> float:
-    """Prove a smaller upper bound.
+    """Try to prove a smaller upper bound on a frame's distance.
 
     Args:
         search: Search for distances.
         frame: Matching frames.
-        target: Sufficient bound, m.
+        target: Bound at which the proof ends, m.
         upper: A proven bound, m.
-        most: Maximum number of boxes.
+        most: Maximum number of boxes in memory.
 
     Returns:
-        The smallest proven bound, m.
+        A proven bound, m; `upper` if no smaller bound is proven.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)

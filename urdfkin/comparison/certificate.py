@@ -32,8 +32,8 @@ from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance, and absolute tolerance near zero (m or rad).
-#: Other machines may have other rounding errors.
+#: Relative tolerance of a certificate's numbers, and absolute tolerance near zero (m or rad).
+#: The machine that wrote the certificate may have other rounding errors.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound, in machine epsilons.
 _BOUND_TOLERANCE = 64.0
@@ -81,7 +81,7 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """Pose conversion: before * (pose in A) * behind."""
+    """Pose of a planar or floating joint in B: before * (pose in A) * behind."""
 
     before: Annotated[Matrix, doc("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, doc("Matrix N (4, 4), multiplied from the right.")]
@@ -108,7 +108,7 @@ class CertifiedJoint(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """Two matching links with different poses on one rigid body."""
+    """Two matching links with different poses on matching rigid bodies."""
 
     a: Annotated[str, doc("Link of A.")]
     b: Annotated[str, doc("Link of B.")]
@@ -116,9 +116,9 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Displacements that `same` treats as rounding errors.
+    """Largest distance and angle that `same` treats as rounding errors.
 
-    The distance holds if joints without limits travel at most 10 m.
+    The distance holds while planar, floating and unlimited prismatic joints travel at most 10 m.
     """
 
     metres: Size
@@ -126,7 +126,7 @@ class Rounding(TypedDict):
 
 
 class FrameEntry(TypedDict):
-    """Interval of a frame's largest distance."""
+    """Interval that contains the largest distance between two matching frames."""
 
     frame: Annotated[str, doc("Link of A.")]
     frame_b: Annotated[str, doc("Link of B.")]
@@ -256,11 +256,14 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
+    The check uses the certificate's pairs of joints. For the verdict "differs", the pairs that `same` chooses
+    must also give "differs".
+
     Returns:
         A line for each wrong statement.
 
     Raises:
-        InputError: the certificate was made for other models.
+        InputError: the certificate was made for other models, or names an unknown joint or link.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -391,7 +394,7 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return the first impossible alignment choice."""
+    """Return the first error in the base pose, conversions and orders of joints, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -465,7 +468,8 @@ def _interval_errors(
 ) -> Iterator[str]:
     """Yield an error for each wrong or unproven bound.
 
-    If `sharply` is true, the check may use branch and bound.
+    `rounding` contains a distance (m) and an angle (rad). If `sharply` is true, the check may use branch and
+    bound.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:

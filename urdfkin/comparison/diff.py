@@ -36,14 +36,14 @@ from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _VECTOR_COMPONENTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default joint attributes: every joint, joints with an axis, mimic joints.
+#: Default attributes of every joint, of joints with an axis, and of mimic joints.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _VECTOR_COMPONENTS.values() for part in parts}
 _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
-#: `diff` uses them if the versions have different formats.
+#: `diff` uses these values if the versions have different formats.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -51,10 +51,10 @@ Value = float | str
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """A changed attribute, or an element of one version.
+    """A changed attribute, or an element that only one version has.
 
     Attributes:
-        what: For example "origin x"; empty for a whole element.
+        what: Name of the attribute, for example "origin x"; empty for a new or removed element.
         size: For versions of different formats: a text such as "38.14 mm off".
     """
 
@@ -81,7 +81,7 @@ class ModelChange:
 
 
 def format_value(value: Value | None) -> str:
-    """Return text that reads back exactly."""
+    """Return a value as text; a number can be read back exactly."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
@@ -95,11 +95,11 @@ def displacement_text(frame: Interval, moves: str = "move", turns: str = "turn")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """Effect of one changed joint alone.
+    """Effect of one changed joint, while all other joints are unchanged.
 
     Attributes:
-        element: For example "joint elbow".
-        interval: Bounds on the largest displacement of a frame.
+        element: The changed element, for example "joint elbow".
+        interval: The frame with the largest displacement, with bounds on this displacement.
     """
 
     element: str
@@ -120,9 +120,10 @@ class Changes:
     Attributes:
         sources: Sources of the old and the new version.
         changes: The changes of the robot's name, then of joints, then of links.
-        effects: The effect of each changed joint, while all other joints are unchanged. A joint whose effect
-            cannot be computed, such as a new joint, has no entry.
-        total: The frame with the largest displacement by all changes; None if no frame moves.
+        effects: The effect of each joint whose changes move links, while all other joints are unchanged. A
+            joint whose effect cannot be computed, such as a new joint, has no entry.
+        total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
+            is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
             does not list these errors. None if single precision does not explain all differences. Infinite if
             the bound was not computed.
@@ -227,7 +228,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield changes with a size."""
+    """Yield the differences that `same` finds if the joints cannot be compared one by one."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -253,7 +254,7 @@ def _change_of(one: Difference) -> Iterator[ModelChange]:
 
 
 def _rename_like_a(result: Sameness) -> KinematicTree:
-    """Rename matched joints and links of B like those of A."""
+    """Return B's tree with A's names for all matched joints and links."""
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
@@ -325,9 +326,9 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of one joint.
+    """Return the effect if only the joint `name` of the old tree changes.
 
-    None: no frame moves, or the effect cannot be computed.
+    The result is None if no frame moves, or if the effect cannot be computed.
     """
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:

@@ -45,7 +45,7 @@ class ReaderDifference:
     """A joint that a library reads differently.
 
     Attributes:
-        size: Largest difference of pose entries.
+        size: Largest difference between matching entries of the child link's pose in the parent link's frame.
     """
 
     joint: str
@@ -59,9 +59,11 @@ class LibraryReading:
     """How a library reads a file.
 
     Attributes:
-        refused: Reason for refusing the file.
-        missing: Links that the library lacks.
-        worst: Largest difference of link poses; 0 within rounding.
+        refused: Reason why the library does not read the file; None if it reads the file.
+        missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
+            the USD file) are listed.
+        worst: Largest difference between matching entries of link poses, relative to the first common link. 0
+            if rounding can explain the difference.
     """
 
     library: str
@@ -88,13 +90,16 @@ def installed_libraries(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare urdfkin with other libraries.
+    """Compare how urdfkin and other libraries read a robot's file.
 
-    By default, all installed libraries for the file's format are used.
+    By default, all installed libraries for the file's format are used. All link poses are compared at q = 0
+    and at random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, or cannot load the robot as urdfkin did.
+        InputError: a library is not installed, or no installed library reads the file's format. The robot has
+            a locked joint, or was loaded from MJCF text instead of a file. The robot is from a USD file with
+            a selected variant or articulation.
     """
     source, form = _library_input(robot)
     names = installed_libraries(form) if libraries is None else tuple(libraries)
@@ -131,7 +136,7 @@ def joint_values(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _compare_reader(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Compare a library's poses with `ours`."""
+    """Compare a library's link poses with urdfkin's link poses `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].formats:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -154,7 +159,7 @@ def _compare_reader(
             title, number, "its model contains none of the robot's links", tuple(answer["joints"])
         )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
-    # `load` may add a root joint.
+    # `load` may add a root joint that the text does not contain.
     # Poses are therefore relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
@@ -183,7 +188,7 @@ def _library_input(robot: Robot) -> tuple[str, str]:
     """Return the input for other libraries.
 
     Returns:
-        URDF text or path, and format.
+        URDF text, or path of an MJCF or USD file, and the format.
     """
     source = robot.origin.source
     if is_usd(source):
@@ -243,10 +248,11 @@ def _find_cause(
 ) -> tuple[str, str]:
     """Return the cause of a difference.
 
-    `T` and `T_theirs` are poses in the parent link's frame. The first pose is at q = 0.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
+    pose is at q = 0.
 
     Returns:
-        An element, and a description.
+        The element that causes the difference, and a description.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
 #: Values from 0.9 m or 0.9 rad have no unit prefix.
-#: Smaller values use the largest prefix for a number from 0.1.
+#: Smaller values have the largest unit prefix that makes the number at least 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
 #: Both limits are slightly lower, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
@@ -56,7 +56,7 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Changes of B that keep the models equivalent.
+#: Kinds of changes. If such changes make B equal to A, the models are equivalent.
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
 #: Differences for which frame distances have an upper bound.
@@ -107,7 +107,7 @@ class Interval:
 #: Value of a parameter of a joint or link.
 #: str: type or name. float: limit of velocity or effort.
 #: tuple for "limits": lower and upper limit.
-#: tuple for "idle": type and value (rad or m) of a fixed joint.
+#: tuple for "idle": type and constant value (rad or m) of a joint that never moves.
 #: tuple for "only in A" and "only in B": names of links.
 #: `Mimic`: mimic rule. None: no value.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
@@ -295,7 +295,7 @@ class JointMap:
     Attributes:
         sense: 1 or -1; 1 for planar and floating joints.
         offset: rad or m; 0 for planar and floating joints.
-        conversion: Pose conversion of a planar or floating joint.
+        conversion: Conversion of a planar or floating joint's pose from A to B; None without a conversion.
     """
 
     a: str
@@ -323,25 +323,28 @@ class Sameness(Displayable):
         remarks: Differences without effect on motion: joint limits, joint types, links of one model.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
-        tools: Matched links with different poses on the same rigid body.
+        tools: Matched links with different poses on the same rigid body. `same` reports the two links as
+            different tools.
         orders: Groups of consecutive joints whose order differs. The order does not affect the motion.
-        base: (4, 4) pose of B's root in A's root frame at zero. The identity if the roots coincide.
-        base_links: Links of A and B to which the poses are relative.
+        base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The identity if the roots
+            coincide.
+        base_links: A link of A and a link of B, on matching rigid bodies. The poses of A and B are compared
+            relative to these links.
         rounding: (m, rad) largest distance and angle that rounding errors can cause between matching frames.
         unlimited: Planar and floating joints of A, and prismatic joints without limits. All bounds on
             distances hold while each of these joints travels at most 10 m.
         single: (m, rad) largest distance and angle that single precision can cause between matching frames.
             None if no file has single precision.
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
-            link.
+            link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`.
         as_written: The interval with the largest distance between the unchanged models. None if `after` is
             empty.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
             with equal names in A and B are compared.
-        narrowed: One line for each joint whose mimic joints have tighter limits. The distances in `frames`
-            are computed for the whole range of this joint.
+        narrowed: One line for each mimicked joint whose range exceeds the limits of its mimic joints. The
+            distances in `frames` are computed for the whole range of the mimicked joint.
         confirmation: Result of Pinocchio's check of the bounds.
         trees: The two robot models.
 
@@ -394,7 +397,9 @@ class Sameness(Displayable):
 
     @property
     def worst(self) -> Interval | None:
-        """The interval with the largest bound; None if all frames agree.
+        """The interval with the largest upper bound; None if no frame differs by more than rounding.
+
+        If upper bounds are equal, the lower bounds are compared, and then the bounds on the angle.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -410,7 +415,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The frame with the largest distance between the unchanged models.
+        """The interval of the frame with the largest distance between the unchanged models.
 
         A and B are compared at equal joint values.
 
@@ -455,7 +460,7 @@ class Sameness(Displayable):
         )
 
     def within(self, most: float) -> bool:
-        """Return whether all matching frames are within `most` (m and rad).
+        """Return whether all matching frames are proven to be within `most` (m and rad).
 
         The unchanged models are compared: their roots coincide, and their coordinates are equal. Different
         base poses, tool frames and joint zeros can therefore increase the distance. The result is False if
@@ -483,7 +488,7 @@ class Sameness(Displayable):
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """Return 0 if the models are equivalent or within a distance, else 1.
+        """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
             strict: Whether remarks and the verdict `Verdict.SAME_AFTER` also give 1.
@@ -580,7 +585,7 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        # The constructor needs a coordinate of B for each joint of A.
+        # The constructor raises an error if B lacks a coordinate for a joint of A.
         Conversion(tree_a, "", found)
         return found
 
@@ -645,8 +650,8 @@ def changes_of_b(
 ) -> tuple[tuple[str, str], ...]:
     """Return the changes that make B equal to A.
 
-    Tool poses are stored in `alignment`. The frames of a Denavit-Hartenberg table depend on its
-    convention. With `tables`, every displaced frame is a tool.
+    The function stores the tool poses in `alignment`. With `tables`, every displaced frame counts as a tool,
+    because the frames of a Denavit-Hartenberg table depend on the table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -704,7 +709,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return the links of the mounting, such as a pedestal."""
+    """Return the matching links of the robots' mountings, such as a pedestal."""
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -725,10 +730,11 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return links around the robot.
+    """Return two sets of links of the root body.
 
     Returns:
-        Links before all moving joints, and links without moving joints.
+        Links with a fixed child that carries all moving joints, such as a pedestal. Links that carry no
+        moving joint, such as a table next to the robot.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -866,7 +872,7 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return differences without effect on motion.
 
-    `single` is the relative rounding error of single precision, or 0.
+    `single` is the relative rounding error of single precision; 0 for double precision.
     """
     some = list[Difference]()
     for step in alignment.steps:
@@ -878,8 +884,8 @@ def remarks(
         for lock in filter(None, map(is_idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
-    # A mimic joint of A can be independent in B,
-    # for example if B has the inverse mimic rule.
+    # A mimic joint of A can be independent in B, although all joint values agree.
+    # For example, the mimic rule in B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.coordinates.get(b.name)
@@ -913,8 +919,8 @@ def limit_differences(
     Args:
         a: The joint of A.
         b: The joint of B.
-        tolerance: Relative; absolute below 1.
-        single: Relative error of single precision, or 0.
+        tolerance: Relative tolerance; absolute if both values are below 1.
+        single: Relative rounding error of single precision; 0 for double precision.
         zero: (sign, offset); value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero

@@ -59,14 +59,14 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
-#: Random configurations at which Pinocchio checks distances.
+#: Number of random configurations at which Pinocchio checks distances.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames with a bound on the finer grid.
-#: Also the maximum number of frames in the search for the largest distance.
+#: The search for the largest distance between unchanged models uses at most this number of frames.
 MAX_FARTHEST_FRAMES = 4
 #: Maximum path length, m; squares of longer lengths overflow.
 MAX_PATH_LENGTH = 1e150
-#: Branch and bound ends at this ratio of bound to largest distance.
+#: Branch and bound ends at this ratio of upper bound to largest distance found.
 SHARP_FACTOR = 1.05
 
 
@@ -98,8 +98,8 @@ def same(
             cannot match by names and axes need an entry.
         bounds: Whether to bound the largest distances between frames. For different models, these bounds take
             most of the time.
-        boxes: Maximum number of boxes of configurations in branch and bound. Boxes give sharper bounds if the
-            models differ in many places. With 0, no boxes are used.
+        boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
+            bounds if the models differ in many places. With 0, no boxes are used.
         within: Limit (m and rad) for `Sameness.within`. Branch and bound then tries to prove this limit for
             the distances of all matching frames.
 
@@ -273,10 +273,10 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound the effect of single precision.
+        """Bound the displacement of frames that single precision can cause.
 
         Returns:
-            Distance, m, and angle, rad.
+            Distance, m, and angle, rad; None if no model has single precision.
         """
         if all(robot.single is None for robot in self.robots):
             return None
@@ -307,7 +307,7 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def align_as_written(self, alignment: Alignment) -> Alignment:
-        """Align the unchanged models, matched as in `alignment`."""
+        """Align the unchanged models, with joints and comparable links matched as in `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -428,7 +428,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Try to reduce `uppers` to `target`."""
+        """Try to reduce the distances in `uppers` to `target` (m) by branch and bound."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -445,7 +445,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If all positions agree, only one frame is searched:
+        # If all positions agree up to rounding, only one frame is searched:
         # the frame with the largest bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
@@ -466,7 +466,7 @@ class Comparator:
     ) -> Interval:
         """Return the interval of a frame.
 
-        `attained` contains a distance (m) and the values of the variables.
+        `attained` contains the largest distance found (m), and the values of the variables there.
         """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
@@ -503,7 +503,7 @@ class Comparator:
         )
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Return the distances that Pinocchio computes.
+        """Return the distances that Pinocchio computes at random configurations.
 
         Returns:
             (frames,) largest distances, m.
@@ -541,9 +541,10 @@ def _joints_fixed_in_one(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the fixed joints that move in `other`.
+    """Return the indices of the fixed joints of `tree` that move in `other`.
 
-    `names` maps joint names of `tree` to names of `other`.
+    Joints match by their names or by their child links. `names` maps joint names of `tree` to names of
+    `other`.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -563,7 +564,7 @@ def _fix_idle_joints(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Fix mimic joints with multiplier 0.
+    """Fix mimic joints with multiplier 0 at their offsets.
 
     A joint is not fixed if the matching joint moves.
     """
@@ -590,7 +591,7 @@ def _match_usd_spellings(
     """Match names that USD spells differently.
 
     Returns:
-        Common link names, and matching joints.
+        Link names of both robots, and matching joints (name in A to name in B).
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -618,8 +619,8 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose of B's root.
 
-    The roots coincide by default. If B's root body contains a link named like A's root, the two coincide.
-    The same rule holds with A and B exchanged.
+    If a link on B's root body has the name of A's root, this link coincides with A's root. The same rule
+    holds with A and B exchanged. Otherwise, the roots coincide.
 
     Returns:
         (4, 4) pose in A's root frame.
@@ -644,21 +645,23 @@ def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:
 class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
-    The rounding errors of all joints together can move a frame farther than one wrong number. Therefore, each
-    joint may differ only by the rounding of its own numbers.
+    The rounding errors of all joints together can move a frame farther than one wrong number. A comparison of
+    frame poses can miss this number. Therefore, each joint may differ only by the rounding of its own
+    numbers.
 
     **Compared quantities.** Two files can describe the same joint by different frames, and can have different
     fixed links. The compared quantities do not depend on these choices:
 
-        P            nearest ancestor of a link in A that B also has
+        common link  a link that both models have
+        P            nearest of a common link's ancestors in A that is also a common link
 
-        in the zero configuration, in the frame of P:
+        for each common link, in the zero configuration, in the frame of P:
             pose of the link
             direction and line of the axis of each joint between P and the link
         multiplier and offset of each mimic rule
 
-    By the product of exponentials, these quantities determine the poses of all common links. The roots of A
-    and B coincide, and no joint direction, joint zero or tool frame is changed.
+    By the product of exponentials, these quantities determine the poses of all common links in every
+    configuration. The roots of A and B coincide, and no joint direction, joint zero or tool frame is changed.
 
     **Bound.** Exact values have an asterisk.
 
@@ -755,7 +758,7 @@ class JointComparison:
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
         """Return P and the joints from P to a link.
 
-        Without a common ancestor, P is the link in `start`.
+        Without a common ancestor, P is A's link in `start`.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -812,7 +815,8 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A shifted link origin also shifts the axis in the parent's frame.
+            # A shifted link origin also shifts the axis in the frame of P.
+            # Therefore, the axes are then compared in the link's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(
@@ -825,7 +829,8 @@ class JointComparison:
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle and distance of two axes.
 
-        The distance is measured from the joint's origin on one axis.
+        The distance is measured from the joint's origin on one axis to the other axis. For a prismatic joint,
+        the distance is 0.
 
         Returns:
             Angle, rad, and distance, m.
@@ -836,7 +841,7 @@ class JointComparison:
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return screws and the link pose relative to P.
+        """Return the joint screws and the link pose in the frame of P.
 
         Args:
             which: 0 for A, 1 for B.
@@ -867,7 +872,7 @@ class JointComparison:
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
         """Return the error bounds after a joint.
 
-        Bounds are in m and rad.
+        `errors` contains the bounds (m, rad) before the joint.
         """
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
