@@ -35,9 +35,9 @@ def code_in(code: FrameCode, to: str) -> FrameCode:
 
 
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
-    """Return an exported file's sealed text.
+    """Return an exported file's text with its digest.
 
-    `file` is the name in comments.
+    `file` is the file name in the comments.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

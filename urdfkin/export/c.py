@@ -144,7 +144,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def count_reserved(code: FrameCode, function: Function) -> int:
-    """Count configurations until every array has eight numbers.
+    """Return how many configurations give each array eight numbers.
 
     Arrays without numbers do not count.
     """
@@ -159,7 +159,7 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """Layout of the C array `in`.
 
-    The order is other inputs, input angles, computed angles, sines, cosines.
+    The order is inputs that are not angles, input angles, computed angles, sines, cosines.
     """
 
     def __init__(self, function: Function) -> None:

@@ -38,9 +38,9 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: Compiler and options for a CUDA file.
+#: Compiler and options for a CUDA file on a computer with a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters that are searched for `EXPORT_MARK` and UNVERIFIED.
+#: Number of first characters that are searched for `EXPORT_MARK` and UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit of a command, s; a thousand joints compile in a minute.
 _TIME_LIMIT = 600.0
@@ -121,7 +121,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Run the vectors in both precisions.
+    """Run the test vectors in double and single precision.
 
     Without a GPU, only the CPU functions of a CUDA file are checked.
     """
@@ -167,7 +167,7 @@ def _find_program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Return lines that begin with "good" or "WRONG"."""
+    """Run a command, and return lines that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,

@@ -44,7 +44,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: On many processors, GCC uses half of the vector width.
+#: By default, GCC uses only half of the vector width on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _load_counter = count()
@@ -403,7 +403,7 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[ConfigurationLike], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether the machine code accepts these arguments.
+        """Return whether the machine code can use all arguments without conversion.
 
         The conversion by `Call` takes a tenth of a large batch's time.
         """

@@ -192,7 +192,7 @@ def _sort_operands(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def find_dependencies(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
-    """Return all nodes of the results.
+    """Return all nodes that the results depend on.
 
     Operations in `leaves` count as inputs.
     """

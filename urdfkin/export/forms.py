@@ -54,7 +54,7 @@ def make_chain_code(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return code for the last frame.
+    """Return code for the last frame of a chain.
 
     The chain's base is the world frame.
     """

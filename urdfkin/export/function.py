@@ -50,7 +50,7 @@ INPUT_LETTERS = ("q", "v", "a")
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement.
 _MAX_OPERATIONS = 12
-#: Maximum number of results in one backward pass.
+#: Maximum number of results in one backward pass, to limit memory.
 _MAX_RESULTS = 512
 
 
@@ -73,7 +73,7 @@ class Function:
 
     @property
     def inputs(self) -> str:
-        """Letters "q", "qv" or "qva"."""
+        """Letters of the inputs: "q", "qv" or "qva"."""
         return self.quantity.inputs
 
     @property
@@ -173,7 +173,10 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 
 
 def _strip_minus(node: Node) -> Node:
-    """Return x for the expression -x."""
+    """Return x for the expression -x.
+
+    Exported code stores x in a variable, and negates x at each use.
+    """
     return node.operands[0] if node.op == "neg" else node
 
 
@@ -219,7 +222,7 @@ def _name_nodes(step: int, state: LinkState) -> None:
 
 @np.errstate(all="ignore")
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
-    """Bound (n, results) errors in single precision.
+    """Bound the errors (n, results) in single precision.
 
     The unit is eps = 2^-23. The inputs must be single-precision numbers. Errors of the constants in double
     precision are excluded. Beyond the range of single precision, the bound is inf.
@@ -276,7 +279,7 @@ def _operation_error(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant_error(x: float) -> float:
-    """Return a constant's error, in eps."""
+    """Return a constant's error in single precision, in eps."""
     size = np.abs(x)
     return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 

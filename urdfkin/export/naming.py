@@ -17,7 +17,7 @@ _MAX_COMMENT_LENGTH = 80
 
 
 def safe_name(name: str) -> str:
-    """Return letters, digits and single underscores.
+    """Return a name of letters, digits and single underscores.
 
     >>> safe_name("panda_joint1"), safe_name("*/ int x; //"), safe_name("%")
     ('panda_joint1', 'int_x', 'x')
@@ -46,7 +46,9 @@ def unique_safe_names(names: Iterable[str]) -> list[str]:
 
 
 def function_prefix(robot: str, frame: str) -> str:
-    """Return a prefix that begins with a letter.
+    """Return the prefix of a frame's exported functions.
+
+    The prefix begins with a letter.
 
     >>> function_prefix("panda", "panda_hand"), function_prefix("ur5", "tool0")
     ('panda_hand', 'ur5_tool0')
@@ -65,7 +67,7 @@ def comment_name(name: str) -> str:
 def comment_text(text: str) -> str:
     """Replace characters that could end a comment.
 
-    C's trigraphs, such as ??/, contain question marks.
+    Question marks are replaced too, because of C's trigraphs, such as ??/.
 
     >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'

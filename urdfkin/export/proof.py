@@ -74,6 +74,7 @@ class Proof:
     Attributes:
         single_precision_bounds: Largest bounds, in eps * scale.
             Beyond the range of single precision, the bound is inf.
+            scale: upper bound on the sum of |term| over a number's terms
         lock: Values of locked joints.
     """
 

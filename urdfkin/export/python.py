@@ -28,6 +28,7 @@ class Dialect:
         result: Yields the lines that return the results.
         imports: Import lines. `{}` stands for functions such as `cos`.
         values: Body of the exported function `_values`.
+            `_values` evaluates a function at several configurations.
         index: Pattern of an input's number, such as `q[0]`.
         check_parameter: Parameter of the exported `check`.
     """
@@ -52,7 +53,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `result` that fills arrays."""
+    """Make a `Dialect.result` that fills an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -65,7 +66,7 @@ def _make_array_result(create: str, index: str) -> Callable[[Writer], Iterator[s
 
 
 def _make_nested_result(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Make a `result` that returns matrices.
+    """Make a `Dialect.result` that returns a matrix.
 
     A Hessian becomes a matrix (6 nv, nv).
     """
@@ -116,7 +117,7 @@ def _check_lines(writer: Writer, first: str = "") -> list[str]:
 
 
 def _make_length_check(text: str) -> Callable[[Writer], list[str]]:
-    """Make `Dialect.first_lines` that check lengths."""
+    """Make a `Dialect.first_lines` that checks the inputs' lengths."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -134,7 +135,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _make_stacked_result(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Make a `result` that stacks numbers.
+    """Make a `Dialect.result` that stacks numbers.
 
     Arrays may be immutable, as in JAX.
     """
@@ -185,8 +186,9 @@ def _make_check(
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong` and `is_array` are Python expressions. An empty `is_array` accepts every container. `given`
-    contains further parameters.
+    `wrong` and `is_array` are Python expressions. `wrong` is true for numbers of a wrong type. `is_array` is
+    true for an accepted container. An empty `is_array` accepts every container. `given` contains further
+    parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -248,7 +250,7 @@ def _torch_module(code: FrameCode) -> str:
 
 
 def _rotation_bound(plan: CompiledTree) -> float:
-    """Return the bound r.
+    """Bound a vector's rotation due to a change of one coordinate.
 
         r >= angle (rad) by which a vector rotates if one coordinate changes by 1 rad
         s: sum of |multiplier| over the revolute joints of one coordinate (mimic rules)
@@ -413,7 +415,7 @@ DIALECTS = {
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return a module with a check."""
+    """Return a Python module with functions and a check."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [

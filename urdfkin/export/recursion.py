@@ -9,8 +9,8 @@ motion about or along z.
 | velocity, acceleration for WORLD | world |
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 
-For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to the results one after another. These
-rotations need a third fewer operations than the frame's rotation matrix R.
+For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to velocity and acceleration one after
+another. These rotations need a third fewer operations than the frame's rotation matrix R.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class TreeRecursion(Recursion):
 
 
 def _without_rounding(x: Sequence[float]) -> Vector:
-    """Replace entries below the rounding error by 0.
+    """Replace entries below the largest entry's rounding error by 0.
 
     Tiny entries, such as 6e-17, would make exported code longer. The error bounds of
     `urdfkin.kinematics.roundings` include this replacement.
@@ -177,7 +177,10 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the Hessian row by row.
 
-    The Hessian contains the terms of (7.126) before their sum.
+    The Hessian contains a matrix H_i (6, nv) for each coordinate i:
+
+        H_i: derivative of the Jacobian with respect to coordinate i
+        time derivative of the Jacobian = sum of H_i v_i (7.126)
     """
     path, nv = TreeRecursion(plan, kind, inputs, own_axes=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)

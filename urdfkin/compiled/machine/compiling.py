@@ -40,7 +40,8 @@ _dumps: Any = dumps
 class KernelCache(_NullCache):  # type: ignore[misc]
     """The disk cache of one function.
 
-    The key contains the source text, because the source may be in another package.
+    The key contains the function's source text. The folder's digest covers only `compiled` and
+    `kinematics`.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
@@ -144,7 +145,7 @@ _config: Any = numba.config  # Numba defines these settings at run time.
 #: The module `numbers` decides which operations are fused.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, without a branch.
-#: Functions without allocation need no reference counts.
+#: Functions must not allocate memory, so arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINED: dict[str, Any] = {
     "forceinline": True,
@@ -201,7 +202,7 @@ WRITABLE_FLOATS_3D = types.Array(types.float64, 3, "C")
 
 
 class Kernel:
-    """A function compiled at first call."""
+    """A function that is compiled, or loaded, at its first call."""
 
     compiled_function: Any
 
@@ -241,7 +242,7 @@ class Kernel:
 class CKernel(Kernel):
     """A compiled function that C code can call.
 
-    All arguments are integers. Calls release the global interpreter lock.
+    All arguments are integers. A call from Python uses ctypes, which releases the global interpreter lock.
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
@@ -265,5 +266,8 @@ def inline_function(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator that makes kernels."""
+    """Return a decorator that makes kernels.
+
+    `arguments` are the Numba types of a kernel's arguments.
+    """
     return lambda function: Kernel(function, arguments)

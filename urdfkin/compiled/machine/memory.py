@@ -132,9 +132,10 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block.
+    """Transpose each square block of a matrix.
 
-    The number of rows must be a power of two.
+    `vectors` are the rows of the matrix. The number of rows must be a power of two. Each pass exchanges the
+    upper right and lower left quarters of blocks of 2 w by 2 w numbers.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -153,7 +154,7 @@ def _add_constant(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Make a reader of `width` numbers."""
+    """Make a function that reads `width` numbers per configuration."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -174,7 +175,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Make a writer of `width` numbers."""
+    """Make a function that writes `width` numbers per configuration."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -202,7 +203,7 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @inline
 def read_rows(m, x, at, stride, count, s, row):
-    """Read numbers into scratch rows.
+    """Read `count` numbers per configuration into scratch rows.
 
     The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, one configuration fills all
     lanes.
@@ -227,7 +228,7 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @inline
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Copy scratch rows to an array.
+    """Copy `count` scratch rows to the array `to`.
 
     If `m` is 1, only one configuration is copied.
     """
@@ -297,9 +298,10 @@ def _add_eight_squares(total, x, at):
 
 @inline
 def add_squares(total, x, at, count):
-    """Add `count` squares to `total`.
+    """Add `count` squares to the lanes of `total`.
 
-    The last numbers may be added eight times. The total is compared only with a very large bound.
+    If `count` is not a multiple of eight, the remaining squares are added to all eight lanes. This is
+    harmless, because the sum is compared only with a very large bound.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
@@ -352,9 +354,9 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @inline
 def stream(x, count, to, at, address):
-    """Copy numbers, bypassing the caches.
+    """Copy numbers. Whole cache lines bypass the caches.
 
-    Writes of whole cache lines need no read. `address` is the address of `to[0]`.
+    A write of a whole cache line needs no read. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES
@@ -368,7 +370,7 @@ def stream(x, count, to, at, address):
 
 @intrinsic
 def wait_for_writes(context: Any) -> Any:
-    """Make copies visible to other processors."""
+    """Make streamed numbers visible to other processors."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.fence("seq_cst")

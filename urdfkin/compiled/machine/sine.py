@@ -1,16 +1,16 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-| Angle x | Method |
+| Absolute value of the angle x | Method |
 |---|---|
 | below 2^20 quarter turns | Cody and Waite, with fdlibm's polynomials (Sun, k_sin.c and k_cos.c) |
-| larger | the C library, for only the larger angles of a vector |
+| larger, or nan | the C library, for only these angles of a vector |
 
 Cody and Waite's method, with n quarter turns:
 
     PI_2 + PI_2_REST: nearly pi/2; two doubles are enough because of fused multiply-adds
     r = x - n PI_2 - n PI_2_REST, in [-pi/4, pi/4]
     r_error: rounding error of r
-    error of a sine or cosine near 0 <= 1e-27
+    absolute error of a sine or cosine near 0 <= 1e-27
 
 The result of a configuration does not depend on the other configurations in the vector.
 """

@@ -54,7 +54,7 @@ _HEADER_WORDS = object.__basicsize__ // 8
 #: Word `_TYPE`: address of the object's type.
 #: Word `_ITEMS` of a tuple: address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
-#: 8-byte words of a NumPy array (C structure PyArrayObject_fields).
+#: Indices of 8-byte words of a NumPy array (C structure PyArrayObject_fields).
 #: Lower four bytes of `_NDIM`: number of axes.
 #: Lower four bytes of `_FLAGS`: flags.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
@@ -135,7 +135,8 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration.
 
-    `arguments` is the address of inputs and output array. `bound` is the address of a tuple:
+    `arguments` is the address of `count` arguments: one to three inputs, then the output array or None. The
+    inputs are q, v and a. `bound` is the address of a tuple:
 
     | Item of `bound` | Object |
     |---|---|
@@ -249,7 +250,8 @@ def make_single_evaluator(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Make a function for one configuration.
 
-    The tree must have one frame and a fixed base. The array contains the kernel's arguments.
+    The tree must have one frame and a fixed base. The returned array contains the kernel's arguments.
+    `KernelArgs.COUNT` is the number of computed results.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes
@@ -267,9 +269,9 @@ def make_single_evaluator(
 def wrap_c_function(
     c_function: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Make a function that calls C.
+    """Make a function that calls a C function instead of a kernel.
 
-    The array contains the C arguments.
+    The returned array contains the C function's arguments.
     """
     address = ctypes.cast(c_function, ctypes.c_void_p).value
     return _make_evaluator(address or 0, orders, shape, plan, c_function)

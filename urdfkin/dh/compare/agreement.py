@@ -42,17 +42,18 @@ TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: A correction of cells is reported if it reduces the tip error
-#: to at most this fraction, or below `NEGLIGIBLE_ERROR` times the reach.
+#: to at most this fraction, or to `NEGLIGIBLE_ERROR` times the reach.
 _CORRECTED_FRACTION = 0.5
-#: A mistake in a table explains a tip error if its correction
-#: reduces the error to at most this fraction, or within the tolerance.
+#: If a table disagrees with the URDF, a corrected mistake must reduce
+#: the tip error to at most this fraction, or within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Suppose n cells differ without a fit, m cells after a fit.
 #: The n cells are reported if n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: The reach is computed from the positions of the tip.
-#: If the tip moves less than this fraction, the path length replaces the reach.
+#: If the tip moves at most this fraction of the path length,
+#: the path length replaces the reach.
 _FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of each cell's last digit, in metres or radians.
 HalfDigits = Sequence[Mapping[str, float]]
@@ -66,7 +67,7 @@ def compare(
     fit: bool = True,
     half_digits: HalfDigits = (),
 ) -> TableComparison:
-    """Compare a table with a path.
+    """Compare a table with a path of a URDF.
 
     Base and tip frames may differ by constant poses. `tolerance` (m) applies at the tip. With `fit`, base,
     tool, joint offsets and signs are fitted first.
@@ -123,9 +124,9 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
-    """Fit fast and return tip errors.
+    """Return the largest tip errors (m, rad) after a fast fit.
 
-    Units: m and rad. The fit stops at a tip error of `target_error` (m).
+    The fit stops at a tip error of at most `target_error` (m).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -136,7 +137,8 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach, m.
 
-    A URDF made from a table without Hayati rows may contain kilometre offsets.
+    The path length can be far larger than the reach. For example, a URDF made from a table without Hayati
+    rows may contain kilometre offsets.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -205,7 +207,8 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
     """Find the reference row of a standard cell.
 
-    In a modified table, row i + 1 contains a, alpha and beta. None without such a row.
+    In a modified table, row i + 1 contains a, alpha and beta of standard row i. The result is None if the
+    table has no such row.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
@@ -288,7 +291,7 @@ def _find_differences_without_fit(
 ) -> tuple[CellDifference, ...]:
     """Find the cells to change instead of a fit.
 
-    Empty if a tip error remains.
+    The result is empty if a tip error remains.
     """
     corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
@@ -309,10 +312,10 @@ def _make_fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Bound the tip error for all joint values.
+    """Return bounds (m, rad) of the tip error.
 
-    Units: m and rad. The bounds exclude rounding errors. Mimic rules are ignored. Prismatic joints without a
-    range stay within `ASSUMED_LIMIT`.
+    The bounds exclude rounding errors. Mimic rules are ignored. The bounds hold for all angles, and for
+    displacements within the limits. Without a range (`has_range`), `ASSUMED_LIMIT` replaces the limits.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -323,7 +326,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 
 def _make_free_tree(path: FrameChain, table: DHTable) -> KinematicTree:
-    """Convert a path, ignoring mimic rules.
+    """Convert a path to a tree without mimic rules.
 
     Links have the table's names.
     """

@@ -46,7 +46,7 @@ _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: Mean error at which the fit ends, relative to the reach.
+#: Mean error at which the fit of cells ends, relative to the reach.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -61,7 +61,8 @@ _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
 #: Above this mean error (relative to the reach), the fit tries large offset changes.
 _ROUNDING = 1e-13
-#: Below this tip error (relative to the reach), no joint sign changes.
+#: At or below this tip error (relative to the reach),
+#: the fit tries no further joint signs.
 _TIP_ROUNDING = 1e-12
 #: Other joint signs must reduce the tip error below this fraction.
 _OTHER_START_ERROR = 0.5
@@ -99,7 +100,10 @@ class TableArrays:
 
     @cached_property
     def T_0_first(self) -> FloatArray:
-        """Zero pose of the first revolute joint's frame."""
+        """Pose of the first revolute joint's frame in frame 0.
+
+        All joints are at zero.
+        """
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
@@ -124,9 +128,9 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path and motions (s, 5 n).
+        """Return the path and the amounts (s, 5 n) of its motions.
 
-        Motions are in rad or m. `values` are (s, n) joint values.
+        The amounts are in rad or m. `values` are (s, n) joint values.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
@@ -158,7 +162,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists to the targets.
+        """Return the twists from poses to their targets.
 
         The shape is (6 s,). Angles are multiplied by `scale`.
         """
@@ -169,7 +173,7 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses with derivatives.
+    """Return the tip's poses and their derivatives.
 
     The derivatives are twists. Angles are multiplied by the scale.
 
@@ -194,9 +198,9 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return tip twists (6 s, 6).
+    """Return the tip's twists (6 s, 6) due to a frame's motion.
 
-    The frame moves along or about its own axes.
+    Columns: translations along the frame's axes, rotations about the frame's axes.
     """
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
@@ -211,7 +215,7 @@ def apply_changes(
 ) -> TableArrays:
     """Change free parameters and cells slightly.
 
-    Angles are multiplied by `scale`.
+    Angles in `free` and `cells` are multiplied by `scale`.
     """
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
@@ -266,9 +270,9 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Remove tip errors by few changes.
+    """Return changes of cells that remove the tip error.
 
-    A cell that acts like a free parameter is not changed.
+    As few cells as possible then differ from `start`. A cell that acts like a free parameter is not changed.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
@@ -317,7 +321,7 @@ def fit_model(
 ) -> TableArrays:
     """Fit the free parameters.
 
-    The fit stops at a tip error of `target_error` (m).
+    The fit stops at a tip error of at most `target_error` (m).
     """
     written = TableArrays.of(standard)
 
@@ -358,7 +362,7 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 
 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
-    """Yield the table, then likely signs."""
+    """Yield the table, then the table with likely joint signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
@@ -411,9 +415,9 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Change consecutive offsets by large angles.
+    """Return models with large changes of two consecutive offsets.
 
-    Rotations about coinciding axes cancel.
+    The two rotations cancel if the joints' axes coincide.
     """
     models = []
     for i in range(len(model.cells) - 1):

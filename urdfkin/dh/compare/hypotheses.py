@@ -82,7 +82,7 @@ class BetterInterpretation:
 def find_better_interpretation(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
 ) -> BetterInterpretation | None:
-    """Find an interpretation that fits.
+    """Find another interpretation that fits the URDF.
 
     Accepted tip errors:
 
@@ -198,7 +198,7 @@ class Interpretation:
     """Convention, units and columns of a table.
 
     Attributes:
-        columns: True contents of the columns.
+        columns: True contents of the columns a, alpha, d and theta.
     """
 
     convention: DHConvention | None
@@ -217,7 +217,7 @@ class Interpretation:
     def difference_count(self, other: Interpretation) -> int:
         """Count the differences between two interpretations.
 
-        Exchanged columns are one difference.
+        Two exchanged columns are one difference.
         """
         columns = sum(
             column != expected for column, expected in zip(self.columns, other.columns, strict=True)

@@ -32,7 +32,8 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _ANGLE_TOLERANCE = 1e-9
-#: With more possible corrections, offsets and signs are not fitted.
+#: If a table has more possible corrections than this number,
+#: joint offsets and joint signs are not fitted.
 _MAX_FITS = 100
 
 
@@ -66,7 +67,7 @@ class MistakeSearch:
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
         """Return the likeliest mistakes.
 
-        After the likeliest correction, a fit changes the fewest parameters:
+        After the likeliest corrections, a fit changes the fewest parameters. Allowed fits:
 
         | Arguments | Allowed fit of the corrected table |
         |---|---|
@@ -99,7 +100,10 @@ class MistakeSearch:
         return ()
 
     def _needs_one_parameter(self, table: DHTable) -> bool:
-        """Whether one fitted parameter is enough."""
+        """Whether a table agrees after a fit of one parameter.
+
+        The parameter is base, tool, a joint offset or a joint sign.
+        """
         if self._fit_one_end(table) is not None:
             return True
         model = self._fit_zeros_and_senses(table)
@@ -135,7 +139,7 @@ class MistakeSearch:
         return fitted if self._agrees(fitted) else None
 
     def _fit_zeros_and_senses(self, table: DHTable) -> TableArrays | None:
-        """Fit all parameters and joint signs."""
+        """Fit base, tool, joint offsets and joint signs."""
         standard, written = to_convention(table, DHConvention.STANDARD), _make_model(table)
         fits = [
             fit_free_parameters(start, self.targets, large_angles=False)

@@ -39,9 +39,9 @@ class CellDifference:
     Values are in m or rad.
 
     Attributes:
-        tip_displacement: Largest tip displacement due to this cell, m.
+        tip_displacement: Largest tip displacement on samples due to this cell, m.
         half_digit: Half a unit of the last digit of `reference`.
-            Exact or unknown values have 0.
+            0 if the value is exact or its text is unknown.
     """
 
     row: int
@@ -70,7 +70,7 @@ class CellDifference:
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """Change of base or tool."""
+    """Change of base or tool by a fit."""
 
     metres: float
     radians: float
@@ -132,19 +132,19 @@ class TableComparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: Fitted table, with the URDF's joint coordinates.
+        reference: Fitted table, with the URDF's joint names and coordinates.
         travel: Sum of the prismatic joints' largest absolute values, m.
         senses: Signs of the joints.
             The table's variable is sign * q + offset.
         metres, radians: Largest tip errors on samples.
         metres_bound, radians_bound: Proven bounds, without rounding errors.
-            Joints stay within their limits.
+            They hold for all angles, and displacements within the limits.
             A prismatic joint without limits stays within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
         unfitted_differences: Cells to change instead of a fit.
             Empty without a fit, or after a found mistake.
             Empty if few changes are not enough.
-        hidden: Row index and name.
+        hidden: Row index and name of each hidden cell.
             A fit compensates errors of hidden cells.
         residual: Tip error after cell corrections, m.
     """
@@ -173,7 +173,7 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the tip error is within `tolerance`.
+        """Whether the fitted table's tip error is within `tolerance` on samples.
 
         Angles are multiplied by the reach.
         """
@@ -221,14 +221,14 @@ class TableComparison:
 
     @property
     def is_exact_unfitted(self) -> bool:
-        """Whether rounding explains all unfitted errors."""
+        """Whether rounding explains the tip errors without a fit."""
         return self.unfitted_metres <= self.rounding_metres and self.unfitted_radians <= self.rounding
 
 
 def has_range(limit: Limit | None) -> bool:
     """Return whether limits are finite and different.
 
-    A joint without motion does not show the direction of its axis.
+    A joint without motion does not show the direction of its axis. Both limits are 0 if a URDF omits them.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
@@ -419,9 +419,9 @@ def _difference_table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Round and format an offset.
+    """Round an offset to a multiple of `fine`, and format the offset.
 
-    Nearly exact multiples of 15 degrees become exact.
+    An angle within `fine` of a multiple of 15 degrees becomes this multiple.
     """
     if abs(offset) <= fine:
         return "0"

@@ -37,9 +37,10 @@ BEAM_WIDTH = 128
 #: Cost (metres) of each joint with sign -1.
 #: Among equal alignments, the URDF's joint signs are preferred.
 _REVERSAL_COST = 1e-9
-#: A prismatic axis can be shifted, so lengths beside it matter little.
+#: Weight of length differences next to a prismatic axis, which can be shifted.
 _PRISMATIC_WEIGHT = 1e-3
-#: Closer axes (m) coincide, so x can have any direction.
+#: Axes closer than this distance (m) count as coinciding.
+#: The axis x can then have any direction.
 _COINCIDENT_DISTANCE = 1e-5
 _DECIMALS = 6
 
@@ -53,7 +54,7 @@ class SignFit:
     Attributes:
         senses: Signs of the joints.
             A sign -1 reverses the reference's variable.
-        offsets: Joint offsets, rad or m.
+        offsets: Joint offsets (rad or m), added to theta or d.
         base: (4, 4) pose T_base_0.
         tool: (4, 4) pose T_n_tip.
     """
@@ -66,15 +67,15 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """An alignment of the first rows.
+    """An alignment of the first joints with the first rows.
 
     Attributes:
-        cost: Weighted difference of cells, m.
+        cost: Weighted difference of cells, plus the cost of reversed joints, m.
         offsets: Joint offsets without the last.
-        phi_in: Rotation about z to the URDF frame, rad.
-        delta_in: Offset along z to the URDF frame, m.
-        free_offset: Row of a free joint offset, and x's direction.
-            The direction is +1 or -1.
+        phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
+        delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
+        free_offset: Row of a joint offset that can be chosen freely, and a sign.
+            The sign is the rotation direction of x if the offset increases.
     """
 
     cost: float
@@ -89,9 +90,10 @@ class _PartialAlignment:
 def find_sign_fits(
     chain: FrameChain, reference: DHTable, count: int = MAX_PATTERNS, beam_width: int = BEAM_WIDTH
 ) -> list[SignFit]:
-    """Return the best alignments with a standard table.
+    """Return up to `count` alignments with a standard table, best first.
 
-    Path and table must have equal joint kinds. With prismatic joints, several results may be equal.
+    Path and table must have equal joint kinds. With prismatic joints, several combinations of signs may give
+    equal tables. Only a fit distinguishes these combinations.
     """
     reach = max(chain.reach, reference.span, MIN_ROBOT_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -141,7 +143,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Extend an alignment by each transform."""
+    """Extend an alignment by joint i + 1, once for each transform."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
@@ -211,8 +213,8 @@ def _possible_transforms(
         # Next to a prismatic joint, any direction of x is possible.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # Above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
-        # With reach 0, a distant common normal misses an origin.
+        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
+        # With reach 0, a common normal is distant if it misses an origin.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

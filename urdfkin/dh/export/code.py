@@ -50,7 +50,7 @@ def header_lines(table: DHTable) -> list[str]:
 
 
 def sanitize(text: str) -> str:
-    """Replace characters that could end a comment or string."""
+    """Replace characters that are not ASCII or could end a comment or string."""
     return re.sub(r"[^ -~]|[\"'\\*%]", "_", text)
 
 
@@ -69,7 +69,7 @@ def check_no_mimic(table: DHTable, what: str) -> None:
 
 
 def format_limits(row: DHRow) -> str:
-    """Return both limits. Without limits: ""."""
+    """Return "lower, upper", or "" without finite limits."""
     return format_numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 

@@ -21,9 +21,9 @@ from urdfkin.model.configuration import TRAVEL_CONDITION
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return the table as plain data.
+    """Return the table as plain data, in metres and radians.
 
-    Units are metres and radians.
+    The key `snap` contains the angles that were rounded to multiples of 15 degrees.
     """
     data: dict[str, Any] = {
         "convention": str(table.convention),

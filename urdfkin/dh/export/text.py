@@ -57,7 +57,7 @@ def format_variable(
 def format_coordinate_names(table: DHTable) -> str:
     """Return text such as "with q1 = left".
 
-    Empty if joint i belongs to row i.
+    The text is empty if each q_i is the joint of row i.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
@@ -65,7 +65,7 @@ def format_coordinate_names(table: DHTable) -> str:
 
 
 def _mimic_offsets(row: DHRow) -> tuple[float, float]:
-    """Return offsets of theta and d."""
+    """Return the mimic rule's offsets of theta and d."""
     offset = row.sense * row.mimic.offset if row.mimic else 0.0
     return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
@@ -115,7 +115,7 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
 
 
 def format_bound(value: float) -> str:
-    """Round a bound up to three digits.
+    """Format a bound with three digits, rounded up.
 
     >>> format_bound(7.5912e-06), format_bound(0.0)
     ('7.60e-06', '0')
@@ -252,8 +252,8 @@ class PrintedPrecision:
     """Tip error of a printed table.
 
     Attributes:
-        metres: Largest error on the samples.
-        bound: Proven bound within the limits.
+        metres: Largest position error on the samples.
+        bound: Proven bound within the joint limits, m.
         unlimited: Whether `ASSUMED_LIMIT` replaces missing limits.
     """
 
@@ -312,7 +312,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
     """Return the mimicked joint's largest absolute value.
 
-    Without a mimic rule: 0.
+    The value is 0 without a mimic rule, or with the multiplier 0.
     """
     if row.mimic is None or row.mimic.multiplier == 0.0:
         return 0.0

@@ -62,7 +62,7 @@ def _link_code(row: DHRow, convention: DHConvention) -> str:
 
 
 def write_matlab_rst(table: DHTable) -> str:
-    """Return a file for a rigidBodyTree."""
+    """Return a MATLAB function file that makes a rigidBodyTree."""
     check_no_mimic(table, "rigidBodyTree")
     poses = frame_poses(table)
     lines = [
