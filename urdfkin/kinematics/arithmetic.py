@@ -1,7 +1,6 @@
-"""Copy the textbook's equations for other types of numbers, such as NumPy arrays.
+"""Copies of `urdfkin.kinematics.equations` that call other functions.
 
-The caller gives functions for the operations, such as sum, product and sine. The copied equations call these
-functions. For example, one copy computes with NumPy arrays, and another copy writes LaTeX.
+For example, in `array_equations` of `urdfkin.kinematics.number_kinds`, `plus` is `np.add`.
 
 This module does not import NumPy.
 """
@@ -14,14 +13,13 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: Vector operations of which all equations consist.
 VECTOR_OPERATIONS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
 def bind_equations(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Copy the equations for other vector operations.
+    """Replace functions in a copy of `equations`.
 
     >>> lengths = bind_equations(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -33,10 +31,12 @@ def bind_equations(
 def rebind_functions(
     *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Copy functions; the copies call each other.
+    """Copy all functions of the modules.
+
+    The copies call other copies and the replacements.
 
     Args:
-        modules: Each module after the modules that it uses.
+        modules: For example, `recursion, outputs`, because `outputs` imports `recursion`.
         decorate: Decorator of each copy.
         replacements: Functions or modules by name.
     """

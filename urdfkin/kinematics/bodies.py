@@ -22,9 +22,13 @@ Jacobian J converts joint velocities to x-dot, where x = (position, orientation)
 analytical Jacobian. For three Euler angles in any sequence (the textbook uses "ZYZ"), x has 6 numbers and J
 is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J is (..., 7, n).
 
-Functions that take an `ArrayLike` raise InputError for a wrong shape and for a value that is not finite.
-These functions also raise InputError for an axis that is not a unit vector and for a matrix that is not a
-rotation. An unknown `representation` raises UnknownNameError. A distance of `nearest` or less from the
+| Argument | InputError for |
+|---|---|
+| any `ArrayLike` | a wrong shape, or a value that is not finite |
+| axis | a length other than 1 |
+| rotation matrix | a matrix that is not a rotation |
+
+An unknown `representation` raises UnknownNameError. A distance of `nearest` or less from the
 singularity of Euler angles raises RepresentationSingularityError.
 """
 

@@ -1,10 +1,12 @@
 """The equations of motion of sections 7.3 to 7.7 of the textbook, for all kinds of numbers.
 
 A vector is a triple of numbers (x, y, z), and a rotation is a triple of rows. The module imports nothing,
-because the equations use the arithmetic of their arguments. Each equation is written only once. It runs on
-batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors and LaTeX
-expressions. For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the
-functions of the section "vectors".
+because the equations use the arithmetic of their arguments. Each equation is written only once. Kinds of
+numbers: batches in vector registers, NumPy arrays, numbers with 50 digits, intervals, lengths of vectors,
+LaTeX expressions.
+
+For NumPy arrays and for lengths of vectors, `urdfkin.kinematics.number_kinds` replaces the functions of the
+section "vectors".
 
 | Argument | Meaning |
 |---|---|
@@ -219,9 +221,10 @@ def turning_column_rate(z, z_rate, d, d_rate):
 
 
 def rate_in_turning_axes(rate, w, x):
-    """Return the time derivatives of the components of x.
+    """Return the time derivative of x in rotating axes.
 
-    The axes of the components rotate with w; `rate` is x-dot in fixed axes.
+    rate:  time derivative of x in fixed axes
+    w:     angular velocity of the rotating axes
     """
     return minus(rate, cross(w, x))
 
@@ -232,17 +235,17 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the derivative of a column by an earlier joint (7.85).
+    """7.85: derivative of column i with respect to joint j <= i.
 
-    At joint velocity 1, this joint rotates z and d with w.
+    w:  angular part of column j
     """
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the derivative of z x d by a later joint (7.85).
+    """7.85: derivative of z x d of joint i with respect to joint j > i.
 
-    At joint velocity 1, the end point of d has the velocity `linear`.
+    linear:  linear part of column j
     """
     return cross(z, linear)
 

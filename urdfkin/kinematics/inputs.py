@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 
 #: Tolerance of a unit vector's norm.
 #: Normalising in double precision has an error of at most 4e-16.
-#: With six digits, Rodrigues' formula gives no rotation matrix.
+#: Rodrigues' formula for an axis with six decimals: |R R^T - I| can be 1e-6.
 UNIT_TOLERANCE = 1e-12
 #: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
 #: R with nine decimals: each entry has an error of at most 5e-10.

@@ -29,7 +29,6 @@ _SYMBOLS = {
     "one": "1",
 }
 #: LaTeX symbols for the parameters of one function.
-#: An entry for a function has priority over `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},

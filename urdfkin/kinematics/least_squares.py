@@ -20,13 +20,12 @@ _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 #: Factor of the damping after a step that reduces the error,
 #: and factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: A step is slow if more than this fraction of the error remains.
+#: slow step: new error > _SLOW * old error
 _SLOW = 0.99
 #: The iteration ends if a full step would reduce the squared error
 #: by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: Relative rounding error of the norm of n residuals:
-#: at most this number times n eps.
+#: relative rounding error of the norm of n residuals <= _NORM_ROUNDING * n * eps
 _NORM_ROUNDING = 4.0
 
 
@@ -42,7 +41,7 @@ def least_squares(
     """Search near `start` for the smallest residuals.
 
     The result is the best state and the norm of the residuals.
-    `derivatives` returns the negative derivatives (rows, parameters).
+    derivatives(...)[i, j] = -d(residual i)/d(parameter j).
     No component of a step exceeds `max_step` in absolute value.
     The search ends after `patience` consecutive slow steps; 0 means no limit.
     """

@@ -44,7 +44,7 @@ array_equations = bind_equations(
     product=np.matmul,
 )
 
-#: Length of a vector, for each configuration or for one.
+#: A float, or an array with one length for each configuration.
 Length = Any
 
 
@@ -87,8 +87,7 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: Functions that return the scales of equations' results.
-#: Their arguments are lengths of vectors and absolute values of numbers.
+#: Arguments: lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,

@@ -13,10 +13,14 @@ The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 | `name` | | Euler sequence with SciPy's name |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-The dots stand for any batch shape; results have the batch shape of the arguments. Functions that take an
-`ArrayLike` raise InputError for a wrong shape and for a value that is not finite. These functions also raise
-InputError for a matrix that is not a rotation and for an unknown `frame`. An axis or a quaternion whose
-length is not 1 also raises InputError.
+The dots stand for any batch shape; results have the batch shape of the arguments.
+
+| Argument | InputError for |
+|---|---|
+| any `ArrayLike` | a wrong shape, or a value that is not finite |
+| rotation matrix | a matrix that is not a rotation |
+| axis, quaternion | a length other than 1 |
+| `frame` | an unknown name |
 
 A user's matrix often has only a few digits. A conversion to a quaternion, a conversion to Euler angles, and
 Gram-Schmidt then give different rotations. `nearest_rotation` and `polar_factor` return the rotation that is
@@ -73,7 +77,7 @@ def skew(w: ArrayLike) -> FloatArray:
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the vector w of S(w) (7.26, 7.37).
 
-    `tolerance` limits the symmetric part, relative to the largest entry of S.
+    |S + S^T| / 2 <= tolerance * |S|, where |.| is the largest absolute entry.
     """
     S = as_matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -92,7 +96,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: Largest deviation of a matrix that is used unchanged.
+#: R stays unchanged if |nearest rotation - R| <= ROUNDED.
 ROUNDED = 1e-15
 
 
@@ -292,7 +296,7 @@ def integrate_orientation(
 
     `quat` is the orientation at the first of the increasing `times`, in s.
     A jump of `w` must be at one of the `times`.
-    Each step therefore evaluates `w` slightly inside the step.
+    No step evaluates `w` at one of the `times`.
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -323,7 +327,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Extend 7.57 to quaternions of any length."""
+    """Compute 7.57 for a quaternion with |quat| != 1."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
@@ -384,7 +388,8 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of components below 1e-150 may lose digits; the result is then 2 `vector`.
+    # The square of a number below 1e-150 may lose digits.
+    # For small sine: angle / sine = 2.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -527,8 +532,8 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: At this distance (rad) or less from the singularity,
-#: Euler angle rates have too few correct digits.
+#: Default of `nearest`, rad.
+#: At this distance, the condition number of Omega is 2e9.
 NEAREST = 1e-9
 
 
@@ -573,8 +578,6 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axes = find_sequence(name)
     turns = axes.reorder(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # `along`: component of the third axis along the axis `first`.
-    # `across`: component of the third axis along the axis `other`.
     if axes.is_proper:
         along, across = cosine, -axes.sign * sine
     else:

@@ -260,8 +260,8 @@ MIN_DIVISOR = 1e-300
 #: `factors` is the number of factors of a term. For example, the term w x (w x d) has three factors.
 PINOCCHIO_ROUNDINGS = 24.0
 #: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
-#: `joints` is the same number as for Pinocchio.
-#: `factors` is twice as large, because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
+#: `joints`: the number for Pinocchio.
+#: `factors`: twice the number for Pinocchio (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0
@@ -285,7 +285,8 @@ SINGLE_POLYNOMIAL = 1.0
 #: from the same file, in eps per joint.
 #: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps,
 #: from the first and third row of the first table above.
-#: Standard deviation: 2.4 eps, so 13.7 is nearly six of them.
+#: Standard deviation: 2.4 eps.
+#: 13.7 eps / 2.4 eps = 5.7.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Rounding errors in the directions of two joint axes, in eps.
 #: Each axis: 0.5 from the division by its length,
@@ -302,7 +303,7 @@ FILE_ROUNDINGS = 45.0
 #: Rounding error of a length along a joint axis.
 #: Unit: eps times the length of the path.
 #: Dot product: 2.4 eps. Sum of lengths: 0.5 eps times the sum.
-#: Few of these sums are nearly as long as the path.
+#: Most of these sums are clearly shorter than the path.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
@@ -312,9 +313,8 @@ LENGTH_ROUNDINGS = 4.0
 #: Number in a file: 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error of a rotation matrix entry, in eps.
-#: The entry is a difference of two products. This difference causes an error of 0.75.
-#: In both products, one factor is a difference of two products.
-#: This factor adds an error of 0.75.
+#: entry = a x - b y: 0.75
+#: x = c d - e f, y = g h - k l: 0.75
 ENTRY_ROUNDINGS = 2.0
 #: Largest change when a length is rounded to twelve digits.
 #: Unit: eps times the length of the path.
@@ -330,18 +330,18 @@ ROTATION_ROUNDINGS = 8.0
 #: Allowed error of a mimicked joint's computed limit, in eps.
 #: Subtraction, division, multiplication and addition: 0.5 each.
 #: The sum of the four errors is 2.0.
-#: Twice this sum accepts both ends of the converted range.
+#: With 4.0, the mimic joint's limits allow both computed ends.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference for a single factor.
+    """Return PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps.
 
     Both arguments describe the path: `joints` is the number of joints,
     and `tilt` is the sum of the joints' tilts, rad.
 
     Returns:
-        Difference between urdfkin and Pinocchio, eps.
+        Allowed difference between urdfkin and Pinocchio for `factors` = 1, eps.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]

@@ -1,4 +1,4 @@
-"""A path between two frames as a sequence of joint axes, the basis of Denavit-Hartenberg tables.
+"""A path between two frames as a sequence of joint axes.
 
 As in section 7.5 of the textbook, the axis of joint i is z_{i-1} at O_{i-1}. A revolute joint rotates about
 this axis, and a prismatic joint translates along this axis. The vector d_{i-1,i} leads from O_{i-1} to O_i.
@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Smallest size of a robot in comparisons, m.
-#: A robot whose frames coincide would have the size 0.
+#: size of a robot = max(computed size, MIN_ROBOT_SIZE), m
+#: If all frames coincide, the computed size is 0.
 MIN_ROBOT_SIZE = 1e-9
 
 

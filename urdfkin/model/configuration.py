@@ -60,11 +60,7 @@ TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 @dataclass(frozen=True, slots=True)
 class RangeReduction:
-    """A mimicked joint's range, which the limits of mimic joints narrow.
-
-    Attributes:
-        allowed_range: None if mimic joints allow at most one value.
-    """
+    """A mimicked joint's range, which the limits of mimic joints narrow."""
 
     joint: str
     joint_range: tuple[float, float]
@@ -127,7 +123,7 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the joint ranges within the limits of mimic joints.
 
-    If mimic joints allow at most one value, the range is not narrowed.
+    A joint whose `allowed_range` is None has its own range.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -175,7 +171,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     # Rounding errors narrow the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # With only one limit, the error is infinite.
+    if not math.isfinite(error):  # For example, the limits (0, inf).
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -202,7 +198,7 @@ _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-#: Suffix and unit, without 1/s, of a planar or floating joint's velocities.
+#: Suffixes of velocity names, and units without "/s" for v or "/s^2" for a.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
@@ -377,10 +373,7 @@ def parse_locks(
 
 
 def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
-    """Check the limits of locked joints.
-
-    Mimic joints that together allow at most one value are not checked.
-    """
+    """Check the limits of locked joints."""
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in locked.items():
         q[tree.q_index[tree.joint_index(name)]] = value
@@ -498,7 +491,6 @@ def _degrees_hint(joint: Joint, value: float) -> str:
 
 
 #: Maximum number of configurations in the search for degrees.
-#: All configurations of a batch have the same unit.
 _MAX_CHECKED = 16
 
 
@@ -686,7 +678,7 @@ def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_
     """Draw random samples for a validation.
 
     A mimic joint may exceed its limits: the equations are also valid there.
-    Every eighth sample is fast: the quadratic terms of 7.129 and 7.130 dominate.
+    Quadratic terms dominate the acceleration of every eighth sample (7.129, 7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
     if with_special:

@@ -28,7 +28,7 @@ from urdfkin.errors.numbers import number_remedy, parse_float, parse_quantity
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, as_floats
 
-#: Types of q, v and a; `ArrayLike` includes text.
+#: q, v or a; a text such as "0.3, 30deg" is an `ArrayLike`.
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
@@ -274,7 +274,6 @@ def join_names(names: Sequence[str]) -> str:
 
 
 def _split_cells(text: str) -> list[str]:
-    """Split a text at commas, or otherwise at blanks."""
     text = " ".join(text.split())
     if text[:1] + text[-1:] in ("[]", "()", "{}"):
         text = text[1:-1].strip()

@@ -205,10 +205,11 @@ class Recursion:
                 yield of.v_index, by.v_index, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of the column `six`.
+        """Return d(column i)/dq_j.
 
-        `by` is the column of the joint that moves.
-        `before` is False if this joint follows the joint of `six`.
+        six:     column i
+        by:      column j
+        before:  j <= i
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

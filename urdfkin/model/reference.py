@@ -24,9 +24,7 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: Axes of the results: the frame's if True, else the world's.
-    #: True: results of the body point at the world's origin.
-    #: False: the results describe the frame's origin.
-    at_world: bool
+    at_world: bool  #: Point of the results: the world's origin if True, else the frame's.
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
         member = int.__new__(cls, number)

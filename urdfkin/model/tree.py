@@ -2,8 +2,7 @@
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
 first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
-has the name of its link or joint. A link and a joint can have the same name. If the link is not the joint's
-child link, the prefix `link:` or `joint:` is needed.
+has the name of its link or joint. A link and a joint can have the same name.
 """
 
 from __future__ import annotations
@@ -29,8 +28,7 @@ FloatArray = inputs.FloatArray
 class FrameName(str):
     """A frame's name with a prefix.
 
-    `LinkFrame` always selects a link, and `JointFrame` a joint. A plain string "link:NAME" can also be the
-    full name of a link or joint.
+    `LinkFrame` always selects a link, and `JointFrame` a joint.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
@@ -73,7 +71,7 @@ class JointKind(Enum):
 
     nq: int
     nv: int
-    nq_pinocchio: int  #: Number of coordinates in Pinocchio; free angles are (cos, sin).
+    nq_pinocchio: int  #: Number of coordinates in Pinocchio, for example 2 for (cos, sin).
     has_axis: bool  #: Whether joints of this kind have an axis.
     turns: bool
     has_limits: bool  #: Whether joints of this kind have position limits.
@@ -111,10 +109,7 @@ class Limit:
 
 #: Largest plausible joint angle, rad; some wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: A joint value is far outside a limit if the excess is above
-#: `_FAR_DISTANCE` (rad or m)
-#: and above `_FAR_FRACTION` times the joint's range.
-#: With only one limit, any excess is far outside.
+#: Margins of `far_limits`: rad or m, and fraction of the joint's range.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
@@ -324,10 +319,7 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Smallest and largest plausible angles (2, nq), rad.
-
-        Only rotating joints with limits have finite entries.
-        """
+        """Smallest and largest plausible angles (2, nq), rad."""
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
@@ -379,7 +371,10 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the frame's link.
 
-        In a plain string, a full name has priority over a prefix.
+        | `name` | frame |
+        |---|---|
+        | "link:hand" | the link or joint "link:hand" if there is one, otherwise the link "hand" |
+        | LinkFrame.of("hand") | the link "hand" |
         """
         if not isinstance(name, str):
             raise InputError(
@@ -467,10 +462,7 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Add named poses.
-
-    Only joints with one coordinate keep their values.
-    """
+    """Add named poses."""
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()

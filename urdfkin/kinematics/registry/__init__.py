@@ -19,7 +19,6 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
-#: Numbers of the equations whose statements are unknown.
 #: Page 2 of the chapter, with equations 7.6 to 7.10, is lost.
 #: Section 7.2 repeats equation 7.7.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
@@ -74,7 +73,7 @@ class Misprint:
     """A wrong or incomplete statement in the chapter.
 
     Attributes:
-        test: Test that proves the mistake, as "file::name".
+        test: "file::name" of a test; `printed` fails in this test, and `correct` holds.
     """
 
     where: str
