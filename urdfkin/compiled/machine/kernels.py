@@ -13,7 +13,7 @@ from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
 from urdfkin.compiled.machine.compiling import CKernel, inline
 from urdfkin.kinematics.arithmetic import rebind_functions
 
-#: Objects of the compiled copies that replace Python objects of the same name.
+#: The compiled functions use these objects instead of the Python objects with the same names.
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}

@@ -299,7 +299,11 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add `count` squares to `total`.
 
-    The last numbers may be added eight times. The total is compared only with a very large bound.
+    The last `count % 8` squares are added in all eight lanes:
+
+        sum of squares <= sum of lanes <= 8 * sum of squares
+
+    `is_in_range` compares the sum of lanes with LARGE^2.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)
@@ -354,7 +358,7 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy numbers, bypassing the caches.
 
-    Writes of whole cache lines need no read. `address` is the address of `to[0]`.
+    The processor writes whole cache lines without reading them first. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES
