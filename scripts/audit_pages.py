@@ -55,7 +55,8 @@ _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Maximum numbers of Tab presses per page, and of PDF pages as pictures.
+#: Maximum number of Tab presses per page.
+#: Maximum number of PDF pages that are converted to pictures.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
 #: Without a mouse, the site's theme hides some elements.

@@ -57,7 +57,7 @@ def measure_sections(
 ) -> dict[str, Any]:
     name, frame = ROBOT_FRAMES[0]
     n, rounds = size.configurations, size.rounds
-    rows: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
+    rows: dict[str, Iterator[Row]] = {
         **{name: measured.contender_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(size.joints, size.numbers, rounds),
         "frames": measured.frame_rows(size.frame_configurations, size.frames, rounds),

@@ -10,8 +10,9 @@ multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests 
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
 
-Exit 1: results of this run have different bits, or a result differs from the stored result. With the option
-`--within 0.1`, a difference from the stored result is allowed up to 0.1 times the result's error bound.
+Exit 1: calls with the same inputs return different bits, or a result differs from the stored result. With
+the option `--within 0.1`, a difference from the stored result is allowed up to 0.1 times the result's error
+bound.
 """
 
 import argparse
@@ -40,7 +41,6 @@ from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import compute_bound
 
 #: Sizes of batches. A kernel computes configurations in blocks of eight.
-#: Batches of less than one block, of exactly one, and of more with a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)

@@ -13,9 +13,9 @@
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. GCC and Clang compile the C code; a missing compiler is skipped. The
-compiled programs compute single configurations and batches. The Python code runs with NumPy, and with NumPy
-as an array API namespace, in both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed
-random order, so that a stopped run has checked a random sample.
+compiled programs compute single configurations and batches. NumPy runs the format `numpy` in double
+precision, and the format `array` in double and single precision. GCC compiles CUDA's host functions. The leaf
+links have a fixed random order, so that a stopped run has checked a random sample.
 
 Exit 1: an error exceeds its bound, a function is not verified, or a compiler prints a warning.
 """
@@ -163,7 +163,6 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _write_files(library: str, folder: Path) -> Iterator[Path]:
-    """Write two files for the tip of each robot."""
     for number, (_, robot, frame) in enumerate(leaf_frames(tips=True)):
         quantities = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)

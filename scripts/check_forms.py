@@ -136,7 +136,7 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package also prints the Python version.
+    # Octave's package prints the Python version, which `re.sub` removes.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -172,7 +172,7 @@ RUN: dict[str, Run] = {
 
 
 def measure_excess_widths(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return how much wider (points) each table is than the text."""
+    """Return max(0, table width - text width) of each table, in points."""
     latex = _find_program("pdflatex")
     marked_tables = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked_tables) + "\\end{document}\n", "utf-8")
@@ -214,8 +214,8 @@ class Case:
         """Compare poses with Pinocchio and with urdfkin.
 
         Returns:
-            Largest position error against Pinocchio (m).
-            Largest error against urdfkin, divided by the bound.
+            Largest difference from Pinocchio's position (m).
+            Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # Sine and cosine are rounded even if all lengths are zero.

@@ -20,8 +20,8 @@ from urdfkin.cli import cli
 LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Title, introduction and names of each page.
-#: Only names in `urdfkin` and `Robot` are short.
+#: For each page: title, introduction, and the names that the page describes.
+#: A name without a dot is in `urdfkin` or `Robot`.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -90,7 +90,7 @@ _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )
-#: MathML of a sine or cosine without brackets.
+#: Sine or cosine before a variable, for example `cos q`.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
@@ -143,7 +143,7 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """Name the search dialog for screen readers."""
+    """Add `aria-label` to the search dialog, for screen readers."""
     dialog = 'data-md-component="search" role="dialog"'
     return output.replace(dialog, f'{dialog} aria-label="Search"')
 

@@ -101,7 +101,7 @@ class Worker:
 
 
 def run_worker(seed: int, pipe: Connection) -> None:
-    """Test cases until the parent kills the process."""
+    """Evaluate each case that arrives on the pipe."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

@@ -85,7 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # An imported name is a module or a name of a module.
+        # For example, `urdfkin.robot.loading` is a module, and `urdfkin.robot.Robot` is a class.
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()

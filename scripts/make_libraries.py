@@ -35,9 +35,10 @@ DATA: dict[str, Any] = tomllib.loads(VERSIONS.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
 #: Largest error of a correct pose (m, or rotation matrix entry).
-#: Rounding causes less than 1e-14, a misread element more than 1e-3.
+#: Rounding errors are below 1e-14.
+#: If a library misreads an element, the error is above 1e-3.
 TOLERANCE = 1e-9
-#: Time limit of the process for the remaining features, s.
+#: Time limit of a library's process, s.
 _SECONDS = 60
 _MESSAGE_LENGTH = 160
 VERDICTS = {
@@ -143,7 +144,7 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 def make_page(text: str, figures: Mapping[str, Any]) -> str:
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # Footnotes by letter. A footnote is a difference that a library documents.
+    notes: dict[str, Any] = {}  # Differences that the libraries document, by the footnote's letter.
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

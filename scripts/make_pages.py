@@ -125,7 +125,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # The description of the data type replaces a missing description.
+            # Without a description, an entry gets the description of its type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))

@@ -22,7 +22,8 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 def measure_packages(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
     """Return the sizes (bytes) of a package and its dependencies.
 
-    Omit `without`, and packages that only `without` requires.
+    The result omits the package `without`. The dependencies of `without` are also omitted, unless another
+    package requires them.
     """
     sizes: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()

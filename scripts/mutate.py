@@ -10,8 +10,8 @@ module's package. If no test fails, --slow runs the slow tests in these files. I
 --whole runs all quick tests. The script prints every undetected mutant, and skips the mutants that
 docs/mutation.md lists as harmless.
 
-A named mutant is a mistake that no test detected in the past. It replaces code of one function. The file of
-named mutants states a test that must now fail.
+A named mutant is a mistake that no test detected in the past. A named mutant replaces code of one function.
+Each entry of tests/attacks/named_mutants.toml names the test that must fail for the mutant.
 
 Exit 0: all mutants are detected or harmless.
 Exit 1: some mutants are not detected, or there is no mutant.
@@ -144,7 +144,7 @@ class Mutant:
     file: str
     line: int
     change: str  # the text before and after
-    function: str  # the function with the mutant; line numbers change more often
+    function: str
 
 
 @dataclass(frozen=True)

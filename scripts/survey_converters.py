@@ -13,12 +13,12 @@ usd-exchange contain modules with equal names:
 The script prints a table with one row for each robot. If the user names one tool, a row shows the verdict of
 `same`, and bounds on the distance and on the angle between matching frames. If the user names several tools,
 a row has one cell for each tool, with a short verdict and the bound on the distance. The full verdicts are
-printed to standard error. For several tools, the script saves time: `same` uses no branch and bound, so the
-bounds may be larger.
+printed to standard error. For several tools, `same` uses no branch and bound. This saves time, but the bounds
+may be larger.
 
-The script removes shapes, because a converter would search for their meshes. MuJoCo refuses a moving body
-without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a small mass,
-and correct impossible inertias.
+The script removes visuals and collisions, because a converter would search for the meshes. MuJoCo refuses a
+moving body without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a
+small mass, and correct impossible inertias.
 """
 
 import argparse
@@ -90,7 +90,8 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short forms of verdicts that begin with a key.
+#: Beginning of a verdict, and the word that replaces the verdict.
+#: For example, "single precision" replaces "same up to single precision".
 #: The first matching key counts.
 _SHORT = {
     "same up to": "single precision",
@@ -138,7 +139,7 @@ def _compare(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sam
 
 
 def _write_without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a URDF without shapes, with settings for MuJoCo.
+    """Write a URDF without visuals and collisions, with settings for MuJoCo.
 
     Other tools ignore these settings.
     """

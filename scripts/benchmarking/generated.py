@@ -45,7 +45,7 @@ def frame_results(
     """Return a frame's results in world axes.
 
     The equations are 7.85 (Jacobian) and 7.127 to 7.130 (acceleration).
-    Each joint must have one coordinate. Inputs are arrays or symbols, and `eq` must fit them.
+    Each joint must have one coordinate. `eq` contains the equations for the inputs' type.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):

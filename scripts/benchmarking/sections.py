@@ -156,8 +156,6 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 
 # Steps of a batch, for example the forward recursion:
 # the time of step k is the time of the first k steps, minus the time of the first k - 1 steps.
-# Steps of one configuration: time differences between seven lines of Python (`_calls`).
-# For example, `compute` rejects a tuple as `out`, and then omits the forward recursion.
 
 #: Instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {

@@ -68,10 +68,7 @@ class DifferenceError(Exception):
 
 
 def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str) -> None:
-    """Compare all results with the result of `reference`.
-
-    The computation is also the warm-up of each task.
-    """
+    """Compare all results with the result of `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -144,7 +141,8 @@ class Calls:
     label: str
     #: Variables of the lines, besides `q`, `v` and `a`.
     names: Mapping[str, Any]
-    #: Lines that compute one result, the value of the last line.
+    #: Lines that compute one result.
+    #: The value of the last line is the result.
     lines: tuple[str, ...]
     #: Lines that write the result of configuration k into `out[k]`.
     #: None: the value of the last line in `lines` is written into `out[k]`.
@@ -155,9 +153,9 @@ class Calls:
     #: Shape of the library's result for one configuration.
     #: None: the shape of urdfkin's result.
     shape: tuple[int, ...] | None = None
-    #: Converts a batch's raw results to urdfkin's conventions.
+    #: Function that converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
-    #: Converts a call's result to the layout of `out[k]`.
+    #: Function that converts a call's result to the layout of `out[k]`.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
     remark: str = ""
 

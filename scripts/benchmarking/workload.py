@@ -77,7 +77,7 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """Return a copy without shapes and mimic rules.
+    """Return a copy without visuals, collisions and mimic rules.
 
     All links get the same inertia, because some libraries need inertias.
     Links and joints named `world` are renamed, because some libraries add this body.

@@ -28,7 +28,7 @@ class Outcome:
     """The outcome of a test.
 
     Attributes:
-        result: An element of `PASSED`, or the failure.
+        result: An element of `PASSED`, or a failure, for example "disagrees with Pinocchio".
     """
 
     result: str

@@ -26,7 +26,8 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes beyond floating point; results may be nan.
+#: Codes of findings about huge numbers.
+#: With these findings, results may be inf or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
@@ -36,7 +37,8 @@ SINGLE_FRAMES = 2
 TESTED_NAMES = 6
 #: Distance of the far base from the origin, m.
 FAR = 1e6
-#: Quantities that one call computes for several frames, with their numbers of inputs.
+#: Quantities that one call computes for several frames.
+#: The value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -104,7 +106,6 @@ def _check_results(robot: Robot, findings: list[Finding], warned: list[warnings.
         return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
     if verified:
         return Outcome("verified")
-    # A finding must state why results are unchecked.
     for finding in findings:
         if finding.pinocchio_reading is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)

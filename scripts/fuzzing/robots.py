@@ -53,7 +53,6 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def format_number(rng: random.Random, x: float) -> str:
-    """Return a random notation, which may round the number."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -131,7 +130,6 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return limits of a joint, rarely reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:

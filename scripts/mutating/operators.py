@@ -141,7 +141,7 @@ def _definition(tree: ast.Module, function: str) -> ast.AST:
 
 
 def _parse_alternatives(code: str) -> list[list[ast.AST]]:
-    """Return each possible interpretation of a piece of code."""
+    """Parse code as an expression, statements or keyword arguments."""
     readings = []
     for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
         for kind in kinds:

@@ -1,9 +1,16 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
-Consider joint k, and assume that all later joints are fixed. The frame's origin then moves relative to link
-k-1 with the velocity u_k. The velocity u_k is v_k z x d for a revolute joint, and v_k z for a prismatic
-joint. Link k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the terms of the
-acceleration of a moving point in a moving frame. Equation 7.130 is the sum of these terms over all joints:
+| symbol | quantity |
+|---|---|
+| u_k | velocity of the frame's origin relative to link k-1, if joints k+1, k+2, ... are fixed |
+| w_{k-1} | angular velocity of link k-1 |
+| d | vector from the joint's origin to the frame's origin |
+
+    u_k = v_k z x d    for a revolute joint
+    u_k = v_k z        for a prismatic joint
+
+Equation 7.125 gives the terms of the acceleration of a moving point in a moving frame. Equation 7.130 is the
+sum of these terms over all joints:
 
 | kind | term | cause |
 |---|---|---|
@@ -12,9 +19,8 @@ acceleration of a moving point in a moving frame. Equation 7.130 is the sum of t
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
 
-The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
-joint (7.110). A difference of two positions in the world would lose digits if the robot is far from the
-world's origin or has a long link.
+The vector d is the sum of the interorigin vectors after the joint (7.110). A difference of two positions in
+the world would lose digits if the robot is far from the world's origin or has a long link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
 planar or floating joint has an additional Coriolis term, because the joint's axes of translation rotate. The
@@ -53,7 +59,7 @@ class AccelerationBreakdown(Displayable):
 
     Attributes:
         joints: Moving joints from the base to the frame.
-        base: (..., 6) acceleration of the frame if all joints were fixed.
+        base: (..., 6) contribution of the base's motion.
         terms: (..., joints, 4, 6) contributions; `ACCELERATION_KINDS` names the four kinds.
     """
 
@@ -126,7 +132,7 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """Split the classical acceleration of a link's frame.
+    """Return each joint's contributions to a frame's classical acceleration.
 
     `base` has the shape (n, 24) or (1, 24); see `BaseMotion.state`.
     The terms are written to `out` (n, joints, 4, 6).

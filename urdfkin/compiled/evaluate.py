@@ -62,7 +62,7 @@ _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V,
 
 
 class EvaluateOptions(TypedDict, total=False):
-    """Keyword arguments of every function of this module.
+    """Keyword arguments of `placements`, `velocities` and the similar functions.
 
     Attributes:
         base: State of the base, (n, 24) or (1, 24).
@@ -184,7 +184,9 @@ def _compute_interpreted(
     """Compute a batch with Python numbers.
 
     Returns:
-        None if a kernel becomes available; 1 for nan, inf or too large inputs, else 0.
+        None: a kernel is available now, and must compute the batch.
+        1: an input is nan, inf or too large.
+        0: otherwise.
     """
     if preload.get_kernel(name) is not None:
         return None
@@ -314,7 +316,7 @@ def compute_in_blocks(
     """Compute `out` in several threads.
 
     All arrays must be C-contiguous. An input has n rows, or one row for all configurations.
-    `compute` must release Python's global interpreter lock.
+    `compute` must release Python's global interpreter lock, so that threads run in parallel.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else as_int(threads, "threads", 1)

@@ -146,7 +146,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Compile the joints that move the given links.
+    """Convert a tree to arrays for the given links.
 
     Results are in the order of `links`.
     """
@@ -341,8 +341,11 @@ class ProgramHeader(IntEnum):
 LANES = 8
 #: Integers per instruction: operation, three operands, index of its constants.
 INSTRUCTION_WIDTH = 5
-#: Integers per joint angle: scratch rows of the angle and of its sine,
-#: index of the mimic rule, and whether the rule changes the angle.
+#: Integers per joint angle:
+#: 0: scratch row of the angle,
+#: 1: scratch row of the sine,
+#: 2: index of the mimic rule,
+#: 3: whether the rule changes the angle.
 ANGLE_WIDTH = 4
 #: Scratch rows. Row 0: number 0. Row 1: number 1.
 #: Rows 2 to 17: results of a frame. Row 18: a joint angle.
@@ -350,8 +353,10 @@ ANGLE_WIDTH = 4
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Integers per Jacobian column in a program for a Hessian:
-#: first scratch row of the column, the joint's row in `steps`, the joint's index in v,
-#: and first scratch row of the sum of derivatives with respect to the joint.
+#: 0: first scratch row of the column,
+#: 1: the joint's row in `steps`,
+#: 2: the joint's index in v,
+#: 3: first scratch row of six sums (derivatives with respect to the joint).
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -473,7 +478,7 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save a state that a later event needs.
+        """Save the state of `step` if an event after `following` needs the state.
 
         At the event `following`, the state is still in the registers.
         """
@@ -554,7 +559,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each element of the (6, nv) matrix."""
+        """Return the scratch rows that contain the (6, nv) matrix, row by row."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):
@@ -577,7 +582,7 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight that contains an index."""
+    """Return multiples of 8, for example [0, 8] for the indices [3, 5, 12]."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 
@@ -594,7 +599,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Indices in the array of a kernel's arguments.
 
-    KERNEL to COUNT are only for single configurations.
+    Batches do not use KERNEL and the members after KERNEL.
     """
 
     PROGRAM = 0
@@ -607,8 +612,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Doubles from one configuration to the next;
-    #: 0 if one row is for all configurations.
+    #: Stride (in doubles) between consecutive configurations.
+    #: Stride 0: all configurations use the same row.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -31,15 +31,15 @@ from urdfkin.system.locks import import_lock
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) for the time in plain Python.
-#: The table in the module's docstring lists the action for each threshold.
+#: After these times (s) in plain Python, this module loads or compiles a kernel.
+#: The table in the module's docstring lists the action for each time.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: The first kernel is loaded after `LOAD_AFTER` of plain Python.
 #: Each further kernel is loaded after this time of plain Python, s.
 _LOAD_NEXT_AFTER = 0.03
 #: Time that the fast function saves per call, s.
 _SECONDS_SAVED = 5e-5
-#: Interval between searches for a missing kernel, s.
+#: Minimum time between two searches for a kernel on disk, s.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
@@ -60,7 +60,7 @@ _modes: list[ComputeMode] = []
 
 @contextmanager
 def use_only(mode: ComputeMode) -> Iterator[None]:
-    """Compute only with Python numbers or only with kernels."""
+    """Select plain Python or kernels inside a `with` block."""
     _modes.append(mode)
     try:
         yield
@@ -96,9 +96,9 @@ def get_kernel(name: str, expected_seconds: float = 0.0, module: str = KERNELS_M
 
 
 def should_load_single(name: str) -> bool:
-    """Return whether to load the function for one configuration.
+    """Return whether to load the kernel `one_configuration`.
 
-    Each call counts the time that the function could have saved.
+    Each call adds the time that this kernel could have saved.
     """
     if _modes:
         return _modes[-1] == "compiled"
@@ -143,7 +143,7 @@ def _compile_in_background(name: str, module: str) -> bool:
     if kernel_cache_folder() is None:
         return False
     if not compile_lock.acquire(blocking=False):
-        return True  # Another thread compiles, or starts the second process.
+        return True  # Another thread is compiling a kernel or starting the second process.
     try:
         if any(process.poll() is None for process in _background.values()):
             return True

@@ -196,7 +196,6 @@ def one() -> ConstantNumber:
 
 
 def unused() -> ConstantNumber:
-    """Return the placeholder for an unneeded number."""
     return _UNUSED
 
 

@@ -19,9 +19,9 @@ world axes. The joint axis and the interorigin vector have constant components i
 The recursion uses the axes in which the result is requested. If the result were rotated to these axes at the
 end, this rotation would add rounding errors.
 
-The placeholder `unused()` replaces each vector that a result does not need. In a kernel, operations with the
-placeholder take no time. `urdfkin.compiled.machine.kernels` compiles copies of these functions with Numba's
-number types.
+The placeholder `unused()` replaces each vector that a result does not need. Kernels contain no code for
+operations with the placeholder. `urdfkin.compiled.machine.kernels` compiles copies of these functions with
+Numba's number types.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def express(axes, R, x):
 
 
 def express_after_rotation(axes, S, x):
-    """Return a vector's components after a frame's rotation."""
+    """Return S^T x in link axes, or x in world axes."""
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 
@@ -301,7 +301,8 @@ def _restore_state(s, row, state):
 def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read whole blocks of eight numbers, which is faster.
 
-    Later inputs overwrite the surplus numbers, or no instruction uses them.
+    For example, if nq is 6, the function may read eight numbers. The last two numbers go to rows of v.
+    The recursion then reads v into these rows, or does not use these rows.
     """
     for i in range(begin, end):
         at = blocks[i]

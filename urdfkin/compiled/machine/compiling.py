@@ -1,8 +1,8 @@
 """Compile kernels with Numba and cache them on disk.
 
 The cache folder's name contains a digest of all sources of `compiled` and `kinematics`. Each cache file
-contains a digest of its content. If a cache file is damaged, its kernel is compiled again. Numba itself
-executes cache files with changed bits.
+contains a digest of its content. If a cache file is damaged, its kernel is compiled again. Numba's own
+cache does not check files for changed bits.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # Another version of Numba may have written this valid file.
+            # The digest is correct, but another version of Numba may have written the file.
             # Reading such a file can cause any error.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")

@@ -300,8 +300,11 @@ def _add_eight_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add `count` squares to the lanes of `total`.
 
-    If `count` is not a multiple of eight, the remaining squares are added to all eight lanes. This is
-    harmless, because the sum is compared only with a very large bound.
+    The last `count % 8` squares are added in all eight lanes:
+
+        sum of squares <= sum of lanes <= 8 * sum of squares
+
+    `is_in_range` compares the sum of lanes with LARGE^2.
     """
     # Additions to one sum wait for each other, so four sums are faster.
     second, third, fourth = broadcast(0.0), broadcast(0.0), broadcast(0.0)

@@ -37,7 +37,7 @@ _2_PI = 2.0 / math.pi
 def sine_cosine(s, row, x):
     """Return sines and cosines of angles.
 
-    If an angle is nan or large, scratch row `row` is overwritten.
+    If an angle is nan or large, the function writes the angles to scratch row `row`.
     """
     sine, cosine = _small_sine_cosine(x)
     if _any_large(x):

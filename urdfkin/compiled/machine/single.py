@@ -117,7 +117,8 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 def _doubles_address(array, ndarray, flags, axes, rows, columns):
     """Return the address of the doubles.
 
-    The address is 0 for unsupported arrays. The first axis has the length `rows`, each other axis `columns`.
+    The address is 0 for unsupported arrays. The array must have `axes` axes and the shape (rows, columns,
+    columns, ...).
     """
     x = integers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
