@@ -51,7 +51,7 @@ class LibraryModel:
     Attributes:
         joints: Joints with a coordinate, in the library's order.
         poses: Returns the pose (4, 4) of each link relative to the root.
-            Links that the library merged are missing.
+            The result contains no merged links.
     """
 
     joints: list[str]
@@ -458,7 +458,8 @@ def _evaluate_cases(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[s
 def main() -> None:
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    # Texts of libraries go to standard error, results to standard output.
+    # Libraries print to standard error.
+    # The results go to standard output.
     output = os.dup(1)
     os.dup2(2, 1)
     for line in _evaluate_cases(sys.argv[1], json.load(sys.stdin)):

@@ -1,4 +1,4 @@
-"""Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian, without any angle.
+"""Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian.
 
 urdfkin compares these Jacobians with the results of `urdfkin.kinematics.rotation` and
 `urdfkin.kinematics.bodies`. This module shares no code with the two modules. The functions also accept arrays
@@ -29,7 +29,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
         derivative of an angle = (reciprocal basis vector of its axis) . (angular velocity)
 
     Args:
-        name: SciPy's name; capitals for body axes, small letters for fixed axes.
+        name: Axes as in SciPy, for example "ZYX" for body axes or "xyz" for fixed axes.
         R: (..., 3, 3) rotation from body axes to world axes.
         J_v: (..., 6, n) velocity Jacobian [linear; angular], world axes.
 

@@ -70,7 +70,7 @@ from urdfkin.model.tree import FloatArray
 
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: First indices in the state of a moving base.
+#: First indices of p, w, vel, alpha and acc in `BaseMotion.state`.
 _BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
 #: Number of configurations per block of the kernel `lengths`.
 #: A block fits into the L1 cache.
@@ -87,7 +87,7 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) allowed relative error of a factor, eps.
+        roundings: (n, frames) allowed relative error of each vector in a product, eps.
     """
 
     p: FloatArray
@@ -267,10 +267,10 @@ def _propagate_position(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBo
 
 
 def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the lengths of a free joint's vectors.
+    """Return the norms of a planar or floating joint's vectors.
 
     Returns:
-        Displacement, angular and linear velocity, angular and linear acceleration.
+        Norms of displacement, angular and linear velocity, angular and linear acceleration.
     """
     at, (slides, turns) = link.v, _FREE_JOINT_SIZES[link.kind]
     (u, o), (u_rate, o_rate) = (
@@ -313,12 +313,9 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the bound's `k` for each result.
+    """Return `bound.k` in the shape `leading`.
 
-    No result is within the bound if `k` is NaN.
-
-    Returns:
-        Array of shape `leading`, NaN unless 0 < k < inf.
+    k <= 0 and k = inf become NaN. No result is within the bound if k is NaN.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -328,9 +325,10 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def make_bound(
     scale: FloatArray, factors: int, magnitudes: Magnitudes, reference: Reference = _ALIGNED
 ) -> Bound:
-    """Return the bound with k = factors * roundings.
+    """Return a `Bound`.
 
-    LOCAL and WORLD add one factor.
+    LOCAL_WORLD_ALIGNED: k = factors * roundings
+    LOCAL, WORLD: k = (factors + 1) * roundings
     """
     factors += reference is not _ALIGNED
     k = factors * magnitudes.roundings
@@ -369,7 +367,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors, eps rad.
-        rule_count: Number of mimic rules on the path. A chain of r rules counts r times.
+        rule_count: Number of rules of all mimic joints on the path. For example, joint c has two rules if
+            c mimics b and b mimics a.
         lengths: (steps + 1,) additional `CompiledTree.lengths`, m.
     """
 
@@ -381,7 +380,7 @@ class DecimalErrors(NamedTuple):
 def true_value_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
-    """Return the magnitudes for a comparison with true values.
+    """Return `Magnitudes` for a comparison with true values.
 
     True values follow from the URDF's decimals and from the doubles q, v and a. `plan` has a single frame.
 
@@ -481,7 +480,7 @@ def velocity_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Refere
 
 @_allow_overflow
 def acceleration_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> FloatArray:
-    """Return the scale of accelerations and of their breakdowns.
+    """Return the scale of accelerations.
 
         Pinocchio: classical acceleration = spatial acceleration + w x vel
         scale: contains |w| |vel|
@@ -514,7 +513,6 @@ def imu_scale(magnitudes: Magnitudes, gravity: FloatArray) -> FloatArray:
 
 
 def _repeat_as_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Repeat `linear` and `angular` in three rows each."""
     scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
     rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # `np.moveaxis` is slower.
     rows[:3], rows[3:] = linear, angular
@@ -563,9 +561,11 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
 #: Cross products in the linear rows of Pinocchio's Hessian.
 #: A Hessian entry is d(Jacobian column i) / d(coordinate of joint j).
 #: The joints on the path are numbered from the root.
-#: First pair: j <= i. Second pair: j > i.
-#: First number: products z x (z x d) of two revolute joints.
-#: Second number: products z x z of a revolute and a prismatic joint.
+#: Layout: ((a, b), (c, d)).
+#: a, b: j <= i
+#: c, d: j > i
+#: a, c: products z x (z x d) of two revolute joints
+#: b, d: products z x z of a revolute and a prismatic joint
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -680,9 +680,9 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 
 
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the largest |qw| with an uncertain sign.
+    """Return a limit for |qw|.
 
-    Rounding can change the sign of a smaller |qw|.
+    Below the limit, rounding can change the sign of qw.
 
     | | |
     |---|---|
@@ -694,23 +694,21 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def singularity_margin(plan: CompiledTree) -> float:
-    """Return four times the error of a frame's rotation.
+    """Return the smallest allowed angle to a singularity of Euler angles, rad.
 
-    Closer to a singularity of Euler angles, no digit is reliable.
-
-    Returns:
-        Angle, rad.
+    margin = 4 * (error of a frame's rotation)
+    below the margin: no digit of the Euler angles is reliable
     """
     return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Sum the absolute multipliers for each joint velocity.
+    """Sum |multiplier| over the joints that move with the same joint velocity.
 
-    An independent joint has the multiplier 1.
+    For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
-        (frames, nv) sums for revolute and for prismatic joints.
+        (frames, nv) for revolute joints, and (frames, nv) for prismatic joints.
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -720,7 +718,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        # Other threads may read the cache, so the array is complete.
+        # The array is stored last, because other threads read the cache.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 

@@ -87,7 +87,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
 
 
 def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest disagreement of each result.
+    """Return the largest difference in each result, in multiples of eps * scale.
 
     Returns:
         Array of shape `ours.shape[:axes]`.

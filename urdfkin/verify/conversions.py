@@ -57,8 +57,8 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 _SAMPLE_COUNT = 8
 #: Rounding errors of urdfkin and Pinocchio in `check_orientations`, in eps.
 #: Each program has an error below 8 eps.
-#: Angles: arctan2, sines, cosines, products of three numbers.
-#: Quaternions: a square root, a quotient, products of two numbers.
+#: operations for angles: arctan2, sine, cosine, products of three numbers
+#: operations for quaternions: square root, quotient, products of two numbers
 _ROUNDINGS = 16.0
 
 
@@ -215,7 +215,7 @@ def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) ->
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.compute_results(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _model_placements(model, _model_configurations(model, tree, q), made)
-    # The URDF text has rounded angles, hence the factor 2.
+    # The factor 2 allows for rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, compute_magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:

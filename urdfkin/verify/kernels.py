@@ -87,8 +87,8 @@ def _has_equal_triples(scale, k):
 def _divide_triples(ours, theirs, unit, width, units):
     """Compare three rows with equal scales.
 
-    The array `units` receives the largest quotient of each column.
-    A quotient may be NaN or inf.
+    units[j] = (largest |ours - theirs| in column j) / unit[j]
+    units[j] may be NaN or inf
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -104,7 +104,7 @@ def _divide_triples(ours, theirs, unit, width, units):
 def _largest_bits(x, count):
     """Return the largest double's bit pattern.
 
-    Bit patterns of non-negative doubles have the order of the doubles.
+    For x, y >= 0, x < y if bits(x) < bits(y).
     Some processors set the sign bit of NaN.
     """
     most = 0

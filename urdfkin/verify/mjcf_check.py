@@ -151,7 +151,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     """Compare mimic rules with MuJoCo's joint equalities.
 
     Returns:
-        Largest ratio of error to bound; None without rules.
+        Largest ratio of error to bound, or None if there are no rules.
     """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpack_array(answer["residuals"]), unpack_array(answer["rule_sizes"])

@@ -88,7 +88,7 @@ def parse_answers(
     `status` is None if the process exceeded `timeout` (s).
 
     Returns:
-        The answers, and why others may be missing.
+        The answers, and an explanation if an answer is missing.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -117,7 +117,7 @@ def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             read = whole
         except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
-                raise  # MuJoCo compiles the file, but it is not a tree.
+                raise  # Only urdfkin's own errors have a remedy.
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:

@@ -56,8 +56,7 @@ _REPLACEMENT_JOINTS = {
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and joint velocities of a joint's kind.
-#: Other kinds have one coordinate and one joint velocity.
+#: Sizes (nq, nv) of joints. Other kinds have (1, 1).
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -382,7 +381,8 @@ def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray
     """Return a joint's rotations.
 
     Returns:
-        Rotations (n, k, k), and the number k of slide joints.
+        Planar joint: (n, 2, 2) rotation matrices, and 2.
+        Floating joint: (n, 3, 3) rotation matrices, and 3.
     """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
@@ -399,7 +399,7 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
 def _move_mass_to_root(model: Any, root: str) -> Any:
     """Move all mass to the root.
 
-    With the mass at the root, MuJoCo computes zero lever arms exactly.
+    The centre of mass is then exactly the root's origin.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):

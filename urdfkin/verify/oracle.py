@@ -101,8 +101,8 @@ def find_locked_values(lock: Mapping[str, float], rules: Mapping[str, Mimic]) ->
 
 
 #: Sizes (nq, nv) of joints in Pinocchio.
-#: Number of coordinates in urdfkin, by a joint's size in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
+#: For example, a planar joint has nq = 4 in Pinocchio, and nq = 3 in urdfkin.
 _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
@@ -231,7 +231,8 @@ class Frames:
     Args:
         bodies: Frame index of each link.
         joints: Frame index of each joint.
-        parents: Frame of the parent joint for each link frame. A missing entry means equal indices.
+        parents: Maps a link's frame index to the frame index of the link's parent joint. A missing entry
+            means equal indices.
     """
 
     def __init__(
@@ -333,7 +334,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
     # Rounding adds small components along other eigenvectors of K.
-    # K + I = 4 q q^T, so multiplication by K + I removes them.
+    # (K + I) x = 4 q (q^T x), without these components
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -449,8 +450,7 @@ class QueryBatch(NamedTuple):
     Attributes:
         frames_are_joints: Whether `frames` contains `JointFrame` objects.
             Pinocchio then uses its functions for joints.
-        is_partial: Whether `frames` is a part of a longer list.
-            Pinocchio then uses its function for several frames.
+        is_partial: If True, Pinocchio uses its function for several frames even for one frame.
     """
 
     frames: Sequence[str]

@@ -1,4 +1,4 @@
-"""The oracles: Pinocchio, the default, and MuJoCo.
+"""The oracles Pinocchio (default) and MuJoCo.
 
 >>> oracle_library("pinocchio").title
 'Pinocchio'
@@ -24,7 +24,7 @@ class OracleLibrary:
 
     Attributes:
         make_oracle: Constructor of an `Oracle`.
-        adapt_magnitudes: Converts `Magnitudes` from Pinocchio to this library.
+        adapt_magnitudes: Converts `Magnitudes` for Pinocchio to `Magnitudes` for the library.
     """
 
     name: OracleName

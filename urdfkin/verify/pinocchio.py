@@ -111,13 +111,15 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 _STACK_BYTES_PER_LINK = 16_384
 #: Chains with fewer links cause no stack overflow in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), here 2 GB.
+#: Maximum nv.
+#: memory of Pinocchio 4.1.0, measured: about 64 nv^3 bytes
+#: nv = 315: 2 GB
 MAX_NV = 315
 
 #: Number of floating-point values in a block of results.
 #: A block of this size fits into the processor's cache.
 _BLOCK_SIZE = 16384
-#: Function of n: results for the next n configurations.
+#: `compute(n)` returns the results for the next n configurations.
 _NextResults = Callable[[int], list[FloatArray]]
 _BASE_NAME = "base"
 
@@ -328,7 +330,7 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Hessians without two errors of Pinocchio 4.1.
+        """Correct two errors in the Hessians of Pinocchio 4.1.
 
         - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
         - In LOCAL, two velocities of one joint may have a nonzero entry. The true value is 0, because a

@@ -52,15 +52,17 @@ class Quantity:
     Attributes:
         inputs: "q", "qv" or "qva".
         shape: Shape of one result, for example (6, "nv").
-        compute: Function (plan, *inputs, reference, base=, out=, threads=) for urdfkin's results.
-            If `recursive` is False, other arguments are possible.
-        ask_oracle: Function (oracle, query) for the oracle's results.
-        blocks: Function (oracle, query) that yields blocks of results.
-        scale: Function (plan, magnitudes, reference) for the scale of the bound.
-        factors: Largest number of factors in a term, for LOCAL_WORLD_ALIGNED.
-        results_and_bound: Function (oracle, part, ours, library), replaces `ask_oracle` and `scale`.
-        compute_intervals: Function (motion, link, reference) for intervals around true values.
-        recursive: Whether the forward recursion needs only `inputs`.
+        compute: `compute(plan, *inputs, reference, base=, out=, threads=)` returns urdfkin's results.
+            If `recursive` is False, `compute` may have other arguments.
+        ask_oracle: `ask_oracle(oracle, query)` returns the oracle's results.
+        blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
+        scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
+        factors: Number of vectors in the longest product, for example 3 for w x (w x d).
+            `make_bound` adds 1 for LOCAL and WORLD.
+        results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
+            the bound. This function replaces `ask_oracle` and `scale`.
+        compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
+        recursive: True if one forward recursion computes the result from `inputs` alone.
         in_validation: False for Hessians, which are nv times larger than Jacobians.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.

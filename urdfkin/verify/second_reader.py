@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
 #: Bound on the difference of rotation matrix entries for equal angles.
-#: Sine and cosine have an error of one eps each.
-#: Two products and a sum, at most 1, add half an eps each.
+#: three factors, sines or cosines: at most 3 eps
+#: two products and a sum, all <= 1: at most 3 * 0.5 eps
+#: two programs: 2 * (3 + 1.5) eps = 9 eps
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference of normalised axis components.
 #: The length has an error of 2 eps; the quotient adds one rounding.
@@ -70,10 +71,10 @@ def compare_with_yourdfpy(
 ) -> SecondReading:
     """Compare yourdfpy's tree with urdfkin's tree.
 
-    If `root_joint` is True, `load` has added the tree's first joint.
+    If `root_joint` is True, the tree's first joint is not compared.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    # yourdfpy would read files that the document type names.
+    # A document type declaration can make yourdfpy read other files.
     if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type declaration")
     try:
@@ -131,7 +132,7 @@ def _compare_joints(
     """Yield the differences between two joints.
 
     Yields:
-        A difference, and a known fault or an empty text.
+        Pairs (difference, known fault). The fault may be an empty text.
     """
     joint, parent, child = ours
     if theirs.type != joint.kind.value:

@@ -55,7 +55,7 @@ class SingularValues(Displayable):
     """Singular values of some rows of a Jacobian.
 
     Columns that are 0 in every configuration are left out. `print` and notebooks display a table. For a
-    single configuration, the display explains a singularity.
+    single configuration, they also display `singularity()`.
 
     Attributes:
         rows: The chosen rows of the Jacobian, as a slice.
@@ -181,8 +181,12 @@ class SingularValues(Displayable):
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q.
 
-        The derivative of a singular value is u^T J' v, with its singular vectors. The gradient is NaN if the
-        smallest singular value may be 0. There may be no derivative at such configurations.
+            derivative of a singular value = u^T J' v
+            u, v: left and right singular vector
+            J': derivative of J
+
+        The gradient is NaN if the smallest singular value may be 0. There may be no derivative at such
+        configurations.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -276,7 +280,7 @@ def _round_up(x: FloatArray) -> FloatArray:
 def _round_down(x: FloatArray) -> FloatArray:
     """Return a lower bound on the exact number.
 
-    For inf, the bound is the largest double.
+    x = inf: the bound is the largest double
     """
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _RELATIVE_ERROR, -np.inf)

@@ -33,11 +33,10 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 _MAX_SET_SIZE = 4
 #: Jacobians with more columns are not searched for dependent sets.
 _MAX_COLUMNS = 16
-#: Relative rounding error of a singular value decomposition,
-#: divided by eps and by (rows + columns).
+#: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
-#: At random configurations, singular values below this fraction
-#: of the norm count as 0.
+#: At random configurations, singular values count as 0
+#: if they are below this fraction of the norm.
 _NEGLIGIBLE = 1e-9
 
 
@@ -50,8 +49,8 @@ class FrameJacobian:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin, world axes.
         error: (..., 6, nv) bounds on the errors of J.
-        is_revolute: (nv,) True for revolute and False for prismatic joints;
-            None for planar, floating and mimicked joints.
+        is_revolute: (nv,) True: revolute joint. False: prismatic joint.
+            None: planar, floating or mimicked joint.
         active_entries: (6, nv) False for entries that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations.
         moving_base: Whether a base motion is given.
@@ -86,8 +85,7 @@ class Singularity(Displayable):
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
         lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. The
-            array is empty if urdfkin cannot determine the directions. This happens if the frame cannot move
-            in some directions in any configuration, and these directions depend on q or on a moving base.
+            array is empty if directions are lost in every configuration and depend on q or on a moving base.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 

@@ -1,4 +1,4 @@
-"""Compare the placement, Jacobian and acceleration of a Denavit-Hartenberg table's tip with Pinocchio.
+"""Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of the tip.
 
 Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The base
 may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
@@ -171,9 +171,8 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: One pair for linear differences, one pair for angular differences.
-    #: First number: scale of rounding errors. Second number: effect of snapping.
-    #: bound = scale * relative rounding error + effect of snapping.
+    #: Layout: (linear, angular), each (scale of rounding errors, effect of snapping).
+    #: bound = scale * relative rounding error + effect of snapping
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
@@ -292,7 +291,7 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
     own = table_length(table)
     reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
     # `Joint.tilt`: angle between the joint's axes in urdfkin and Pinocchio.
-    # A relative acceleration has up to four rotated vectors per term.
+    # A term of a relative acceleration contains at most four vectors.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

@@ -41,8 +41,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Angle between the joint frames of OpenUSD and urdfkin, rad:
-#: at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`, see `_check_joint`.
+#: Angle between the joint frames of OpenUSD and urdfkin, see `_check_joint`.
+#: angle <= 18 * SINGLE_ROUNDOFF rad
 _ROTATION_ROUNDINGS = 18.0
 #: Rounding errors in a joint's origin, see `_check_joint`.
 _ORIGIN_ROUNDINGS = 3.0
@@ -168,7 +168,6 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five bounds on single precision rounding for each joint.
 #: `urdfkin.urdf.usd.Usd.single_precision` defines the five numbers.
 SingleErrors = Mapping[str, tuple[float, float, float, float, float]]
 
@@ -180,7 +179,7 @@ class SinglePrecisionErrors:
     Attributes:
         links: (links, 2) largest position error (m), angle error (rad), over all configurations.
         joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
-            Columns 0 and 1 describe the child link in the parent link, at q = 0.
+            Columns 0 and 1: pose of the child link relative to the parent link, at q = 0.
     """
 
     links: FloatArray
@@ -309,7 +308,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
-        # Only the first difference is reported, because later bodies move too.
+        # A wrong joint also displaces all later bodies.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -223,7 +223,7 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Add a check to a compiled function.
+        """Return a function that calls `compute` and checks the result.
 
         The returned function has the arguments of `compute`; the last is `out`.
         The function returns None if `compute` does not support the arguments.

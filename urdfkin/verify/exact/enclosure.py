@@ -145,7 +145,6 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Enclose the true results of one sample."""
     if digits is not None:
         digits = as_int(digits, "digits", MIN_DIGITS, MAX_DIGITS)
     tree = verifier.tree

@@ -33,17 +33,19 @@ from urdfkin.verify.bounds import DecimalErrors
 #: Least number of decimal digits in the accuracy study.
 #: 50 digits measure the rounding errors of doubles with 16 digits.
 DIGITS = 50
-#: Decimal digits for a path without joints: twice a double's 15 digits.
+#: Decimal digits for a path without joints.
+#: 30 = 2 * (15 digits of a double)
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
-#: Additional bits of an interval: 15 digits have 50 + 5 bits.
+#: bits of an interval = ceil(digits * log2(10)) + 5
+#: 15 digits: 50 + 5 = 55 bits
 #: With 53 bits, an interval could be four times as wide
 #: as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
 #: Significant digits of a written decimal; 17 digits determine a double.
 _SIGNIFICANT_DIGITS = 17
-#: Digits of a midpoint before the decimal is rounded to 17 digits.
+#: Digits of intermediate results in `format_decimal`.
 _CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _NEWTON_BITS = 30

@@ -51,7 +51,7 @@ def make_base_state(base: BaseNumbers) -> LinkState:
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
-    """Motion and Jacobian columns, by link index."""
+    """The motion of links, and Jacobian columns. The keys are link indices."""
 
     states: Mapping[int, LinkState]
     columns: Mapping[int, tuple[Column, ...]]
