@@ -49,7 +49,7 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(as_interval, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
 #: Representations by angles about fixed axes are omitted.
-#: Their Jacobians equal Jacobians of Euler angles with reversed rows.
+#: For example, the angular rows of "xyz" are the angular rows of "ZYX" in reverse order.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -218,7 +218,7 @@ def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations: of q and -q, the one closer to `near`.
+    """Return the unit quaternions (m, 4) of rotations, with q . near > 0.
 
     Args:
         R: (m, 3, 3) rotations.

@@ -32,8 +32,7 @@ class Failure:
     """The reason why a robot was not checked.
 
     Attributes:
-        is_transient: Whether the robot is not the cause, for example if an answer was lost. A resumed run
-            then computes the chunk again.
+        is_transient: Whether a resumed run computes the chunk again, for example after a lost answer.
         error: Traceback of an unexpected error.
     """
 

@@ -150,7 +150,7 @@ def validate(
             if saved is not None:
                 campaign.load_answers(saved)
             for i, error in unread.items():
-                # A failure ends this loop, so each unreadable robot gets only one.
+                # `missing_chunks` ends after the first failure.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
             missing = [

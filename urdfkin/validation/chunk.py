@@ -4,8 +4,7 @@ A sample depends only on the seed and on the index of the sample. Inputs and res
 data. Therefore, a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2
 of a robot are the neutral configuration, the lower limits and the upper limits.
 
-Random samples are drawn 25 at a time, each draw with its own seed. Therefore, the number of draws in a chunk
-does not change any result.
+Each group of 25 random samples has its own seed. Therefore, the size of a chunk does not change any result.
 """
 
 from __future__ import annotations
@@ -41,14 +40,14 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated_quantities
 
-#: Maximum number of random configurations in one draw; each draw has its own seed.
+#: Maximum number of random configurations with the same seed.
 DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
 #: Minimum number of chunks of a robot with 200 or more samples.
 _MIN_CHUNKS = 8
-#: Maximum number of draws in a chunk.
-#: For a typical robot, 40 draws take one second.
+#: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
+#: A chunk of this size takes one second for a typical robot.
 _MAX_DRAWS = 40
 
 _P = ParamSpec("_P")
@@ -101,7 +100,6 @@ class Timings:
     second: float = 0.0
 
     def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function, and add its time to the attribute `part`."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)
@@ -121,7 +119,7 @@ class Timings:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk, or the sum of adjacent chunks.
+    """Result of one chunk, or the sum of several results.
 
     Only the first chunk of a robot computes `summary`.
     """

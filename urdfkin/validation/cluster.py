@@ -43,13 +43,12 @@ from urdfkin.verify.oracles import version
 #: Every thread then always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent.
-#: A high number is safe: robots cannot crash Dask workers.
-#: The worker runs each chunk in a separate process.
+#: Chunks run in separate processes, so robots cannot crash Dask workers.
 _TRIES = 20
 #: Interval for counting the workers, s.
 _INTERVAL = 1.0
-#: The scheduler does not need these packages.
-#: If the scheduler has one, its version must equal this process's version.
+#: Packages that must have the same version on the scheduler.
+#: The scheduler may lack these packages.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -118,7 +117,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 class _Portless:
     """A scheduler or worker without Dask's web server.
 
-    Every user of the machine could read the web server's pages.
+    Dask's web pages are readable by every user of the machine.
     """
 
     def start_http_server(self, *_: object, **__: object) -> None: ...
@@ -136,8 +135,8 @@ class _ClusterWorker(_Portless, Worker):
 def _without_ports(number: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process, without an open port.
 
-    Dask adds its scratch folders to `sys.path`, so another user could place modules there. Therefore, only
-    the current user can access these folders, and this function removes them from `sys.path`.
+    Dask adds its scratch folders to `sys.path`, so another user could place modules there. Only the current
+    user can access the temporary folder. The function restores `sys.path`.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -166,7 +165,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if a worker or scheduler has other versions.
+    """Raise ClusterError if the cluster and this machine have different versions.
 
     Call this function before any data are sent.
     """

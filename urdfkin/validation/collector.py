@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Each new result is immediately added to the results of adjacent chunks, so the memory does not grow with the
-number of samples. The sum does not depend on the order in which the results arrive.
+The results of consecutive chunks are stored as one sum, to save memory. The sum does not depend on the order
+in which the results arrive.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class _RobotAnswers:
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
-        #: Pairs: a range of chunks, and the sum of the results of these chunks.
+        #: The sum of the results for each range of chunks.
         #: The ranges are disjoint and in ascending order.
         self._sums: list[tuple[range, ChunkResult]] = []
         self._has_disagreed = False
@@ -127,7 +127,6 @@ class _RobotAnswers:
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
-        """Store a result, and add it to adjacent results."""
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1

@@ -26,11 +26,10 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: Largest `Diagnosis.remainder` that explains the user's results.
+#: A mistake with a larger `Diagnosis.remainder` is not reported.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
 #: Number of configurations in a fast first test for exchanged joints.
-#: If an exchange explains them, a second test uses all configurations.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
@@ -63,14 +62,11 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the unexplained fraction of the user's largest error.
+        """Return max |actual - predicted| / max |actual - expected|.
 
         Args:
             predicted: urdfkin's results with a supposed mistake.
             n: Use only the first n configurations.
-
-        Returns:
-            max |actual - predicted| / max |actual - expected|.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -113,8 +109,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A common mistake: a sentence, and a function without arguments.
-#: The function returns urdfkin's results with this mistake.
+#: (sentence, function); the function returns urdfkin's results with the mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -276,7 +271,7 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply the numbers of some joints by `factor`.
+        """Multiply q, v and a of some joints by `factor`.
 
         `at` contains the index in q, and the index in v and a, of each joint. If `count` is 1, only q
         changes; if 2, q and v; if 3, q, v and a.
@@ -421,11 +416,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield a sentence for each column with a simple mistake.
-
-    Examples are the opposite sign, zeros, or the values of another column. The number 0.0 in each pair
-    replaces `Diagnosis.remainder`.
-    """
+    """Yield (0.0, sentence) for each column with a simple mistake."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).velocity_names

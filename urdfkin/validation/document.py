@@ -40,10 +40,7 @@ class ReportedMimic(TypedDict):
 
 
 class ReportedRange(TypedDict):
-    """The values in a mimicked joint's range at which all its mimic joints are within their limits.
-
-    `lower` and `upper` are null if there is only one such value, or none.
-    """
+    """Range of a mimicked joint, reduced by the limits of mimic joints."""
 
     lower: Annotated[float | None, doc("Lower end, rad or m; null: at most one joint value is allowed.")]
     upper: Annotated[float | None, doc("Upper end, rad or m; null: at most one joint value is allowed.")]
@@ -269,7 +266,10 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison with a second oracle, a third library. The entry exists only if there is a second oracle."""
+    """Comparison of urdfkin and Pinocchio with a second oracle.
+
+    The entry exists only if there is a second oracle.
+    """
 
     by: Annotated[str, doc("Name of the second oracle: mujoco.")]
     urdfkin: ReportedOraclePair
@@ -418,7 +418,10 @@ class Document(Header):
 
 
 class ValidationVerdict(StrEnum):
-    """Result of the validation of a robot; HTML and Markdown reports list robots in this order."""
+    """Verdict on one robot.
+
+    HTML and Markdown reports list robots in the order of these members.
+    """
 
     BAD_INPUT = "bad input"
     NOT_VERIFIED = "not verified"
@@ -426,7 +429,6 @@ class ValidationVerdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes: a result disagrees, a robot cannot be read, or Pinocchio did not check a robot.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run, as in shells: 128 + SIGINT.
 INTERRUPTED = 130
@@ -450,8 +452,8 @@ class RunOutcome:
 
     Attributes:
         exit_code: 0: every robot is verified. 1: a result disagrees. 130: the run was interrupted. 2: a robot
-            cannot be read. 3: a robot was not verified or has no report, or there was no robot. If several
-            codes apply, the first code in this order is used.
+            cannot be read. 3: a robot was not verified or has no report, or there was no robot.
+            Order of precedence: 1, 130, 2, 3.
     """
 
     exit_code: int

@@ -2,8 +2,7 @@
 
 The statistics of several chunks, processes and machines can be added. The addition is commutative and
 associative. Therefore, the sum does not depend on the division of the samples into chunks. The sum of two
-statistics contains the worse of the two worst cases. If both cases have the same error, the sum contains the
-case with the smaller sample number.
+statistics contains the worse of the two worst cases.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
@@ -55,7 +54,6 @@ class CrossCheck:
     Attributes:
         by: Name of the second oracle.
         alone: For each library in `CROSS_CHECKED`, the number of results in which only this library differs.
-        undecided: Number of other results with a disagreement.
     """
 
     by: str
@@ -123,7 +121,6 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Add two bounds; the sum has the factor k of `second`."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)

@@ -110,9 +110,9 @@ class FunctionCheck(Displayable):
             bound * factor. The ratio is at most 1 if all results agree.
         oracle_bound_ratio: Largest difference from the oracle's result, as a multiple of bound * factor. None
             without an oracle.
-        rows: `bound_ratio` of each row of the result, by the name of the row.
-        columns: `bound_ratio` of each column of a Jacobian, by the name of the joint velocity. Empty for
-            other quantities.
+        rows: The dictionary {name of the row: `bound_ratio` of the row}, for example {"vx": 0.2}.
+        columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for
+            quantities without a column for each joint velocity.
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception or a wrong shape.
         first_errors: The first exceptions and wrong shapes, with messages.
@@ -232,7 +232,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a verifier that stores the latest calls."""
+    """A verifier that stores the latest call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -427,7 +427,10 @@ class _Run:
         frame: str | Sequence[str] | None = None,
         reference: Reference | None = None,
     ) -> FloatArray:
-        """Return urdfkin's unchecked results; inputs and results are in the function's convention."""
+        """Compute urdfkin's results, without verification.
+
+        Inputs and results are in the function's convention.
+        """
         native_inputs = self._native_inputs(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
@@ -503,7 +506,10 @@ class _Run:
     def _convert_scale(self, native_inputs: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Convert the scale of a bound to the function's convention.
 
-        Each converted number is a sum of urdfkin's numbers.
+        Jacobians, after the rows are reordered:
+
+            converted result = result @ inverse
+            converted scale = scale @ |inverse|
         """
         conversion, name = self.conversion, self.row.name
         assert conversion is not None
@@ -526,7 +532,7 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return a bound on the rounding error of the conversion, in eps * scale.
+        """Return k; the rounding error of the conversion is at most k * eps * scale.
 
         Reordering has no rounding errors. Computed angles, for example degrees from radians, are rounded:
 

@@ -46,7 +46,7 @@ def frame_bytes(samples: int, nv: int) -> int:
 def blocks(count: int, size: int) -> Iterator[slice]:
     """Divide `count` items into slices of at most `BLOCK_BYTES`.
 
-    A larger item has a slice of its own. For zero items, yield one empty slice.
+    For zero items, yield one empty slice.
     """
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
@@ -73,7 +73,7 @@ def check(tree: KinematicTree, samples: int, most: int | None) -> None:
 
 
 def _free() -> Iterator[int]:
-    """Yield the free memory of machine, control groups and process, bytes."""
+    """Yield the free bytes: of the machine, of control groups, under RLIMIT_AS."""
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -101,7 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
-            # Inactive cached files count as used, but the kernel frees them on demand.
+            # Linux frees the memory of inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 

@@ -70,7 +70,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """A pickled robot and chunk; unpickling returns the chunk."""
+    """A pickled robot and chunk. The receiver gets the chunk with its robot."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that display results, but compute no results. Their code may change during a campaign.
+#: Packages that compute no results.
 _DISPLAY = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -167,8 +167,7 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        library_versions: Versions of urdfkin and the oracles that computed the report;
-            None: the installed versions.
+        library_versions: Package versions of the run. None: the installed versions.
         studies: Results of the accuracy study, one for each compared robot. Empty if no study was requested.
             An element is None if the robot's study failed or is missing.
     """

@@ -95,9 +95,10 @@ class RobotInput:
         return robot
 
     def load(self) -> Robot:
-        """Load the robot; an OracleError reports a refusal by Pinocchio.
+        """Load the robot.
 
-        The error also occurs if Pinocchio reads a different robot.
+        Raises:
+            OracleError: Pinocchio refuses or misreads the file.
         """
         robot = self.read()
         if robot.verifier.known_refusal is not None:

@@ -5,7 +5,7 @@ plain data, which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
 from the base to the leaves. If several paths have the same moving joints, the summary contains only one path.
-Each chain has a standard and a modified table. The tables are exact, and are compared with Pinocchio.
+Each chain has a standard and a modified table.
 """
 
 from __future__ import annotations

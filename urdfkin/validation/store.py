@@ -1,4 +1,4 @@
-"""Store the results of a campaign in a folder with a manifest and one small file for each chunk.
+"""Store the results of a validation in a folder.
 
     DIR/manifest.json              definition of the campaign
     DIR/chunks/4f/4f1a....chunk    result of a chunk
@@ -12,7 +12,7 @@ the sha256 of all data on which the chunk's numbers depend. Therefore, results o
 are never reused.
 
 Files are written atomically, so a file is either complete or absent. A file's name contains the key of its
-chunk. The store reports damaged files, and files whose names contain no key of the manifest. A store that is
+chunk. The store reports damaged files, and files that belong to no chunk of the validation. A store that is
 open for writing also moves the reported files to the folder `damaged/`. The results in a damaged file are
 computed again.
 """
@@ -58,7 +58,6 @@ if TYPE_CHECKING:
 
 #: Name and version of the layout of a store.
 _LAYOUT = "urdfkin-campaign/1"
-#: Maximum number of listed differences between two campaigns.
 _MAX_DIFFERENCES = 4
 _MANIFEST, _LOCK, _CHUNKS, _DAMAGED = "manifest.json", "lock", "chunks", "damaged"
 _SCRATCH = ".writing"
@@ -207,10 +206,7 @@ class Store:
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with unknown names, and move them to `damaged/`.
-
-        A name is unknown if it contains no key of the manifest.
-        """
+        """Report files with unknown names, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -222,7 +218,7 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Count the stored chunks of each robot from file names.
+        """Count the stored chunks of each robot.
 
         Returns:
             (number of chunks, whether a chunk failed) for each robot.
@@ -308,8 +304,12 @@ def open_store(
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock it.
 
-    With the shard "2/4", other processes can write the other shards at the same time. Without a shard, only
-    this process can write. `retry_failed` deletes stored failures, because the robots' files may differ now.
+    | shard | locks of this process |
+    |---|---|
+    | "2/4" | shared lock of the store, exclusive lock of the shard |
+    | None | exclusive lock of the store |
+
+    `retry_failed` deletes stored failures, because the robots' files may differ now.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -346,9 +346,9 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether a file or folder may belong to a new store.
+    """Return whether a path has the name of a lock or folder of a store.
 
-    Another process may have created its locks and folders, but not the manifest.
+    A new store gets its lock before its manifest.
     """
     return path.name in (_SCRATCH, _CHUNKS) or path.name.startswith(_LOCK)
 
@@ -485,10 +485,7 @@ class AccuracyStore:
 
     @classmethod
     def from_store(cls, store: Store) -> AccuracyStore | None:
-        """Return the stored accuracy results, or None.
-
-        Unreadable settings also give None, and a message to the user.
-        """
+        """Return the stored accuracy results, or None."""
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
                 return None

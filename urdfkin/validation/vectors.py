@@ -65,7 +65,7 @@ LICENCE = "CC0-1.0"
 #: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
 #: Random velocities and accelerations are from -_RANGE to _RANGE.
-#: Planar and floating joints have positions in the same range.
+#: Random positions of planar and floating joints are also from -_RANGE to _RANGE.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID.
 #: Exceptions are quaternions and limits. Multiples of 1 / 1024 are exact as decimals and doubles.
@@ -80,9 +80,9 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     compute_intervals=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: Spatial accelerations have the bound of classical accelerations.
-#: The accelerations differ by the cross product of angular and linear velocity.
-#: The bound includes the error of this product.
+#: Spatial acceleration = classical acceleration - w x v.
+#: The bound of ACCELERATION includes the error of w x v.
+#: Therefore, both accelerations have the same bound.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -399,7 +399,7 @@ def _write(place: Path, robot: Robot, head: _Header, frames: Sequence[str], samp
 
 
 def _result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON, with its exact decimals."""
+    """Return a result as JSON."""
     texts = {name: json_text(x) for name, x in one.items()}
     texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"

@@ -5,8 +5,8 @@ interpreter. A worker imports neither the parent's main module nor modules of th
 needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot.
 
 If a chunk crashes a process, the same chunk and the robot's remaining chunks run after all other robots, in a
-separate process. A second crash is the robot's result. With `isolate`, each robot has a separate process from
-the start, and the first crash is the robot's result.
+separate process. After a second crash, the robot is reported as not verified. With `isolate`, each robot has
+a separate process from the start. The robot is then reported as not verified after the first crash.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from urdfkin.validation.engines import AnswerCallback, RobotTasks, Task, Work, W
 
 #: Module with the function `serve`, which each worker process runs.
 WORKER = "urdfkin.validation.worker_processes"
-#: Maximum time from the end of a worker's pipe to the end of its process, s.
+#: Maximum time to wait for the exit status of a crashed worker, s.
 _GRACE = 5.0
 
 
@@ -51,8 +51,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Both processes have the worker's end of the pipe. Close this end in the parent process.
-            # The pipe then closes as soon as the worker ends.
+            # The worker process has a copy of `theirs`.
+            # If the worker ends, `connection.recv()` then raises EOFError.
             theirs.close()
 
     @property
@@ -162,15 +162,15 @@ class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        alone: Text in the report if a process with only one robot crashes; None: processes validate several
-            robots.
+        alone: None if a process validates several robots. Otherwise, each process validates one robot, and
+            `alone` is the reason in the report after a crash.
     """
 
     def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Tasks of each robot that crashed a process.
+        #: The unfinished tasks of each robot after a crash.
         #: These tasks run after all others.
         self.to_retry: dict[int, list[Task]] = {}
 
