@@ -23,7 +23,8 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands of each heading, with their modules and summaries.
+#: Commands below each heading of the help page,
+#: each with its module in `urdfkin.cli` and its summary.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
@@ -109,7 +110,9 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Suggested commands for other words, for example `placement` for "fk".
+#: Suggested commands for words that are not commands.
+#: For example, urdfkin suggests `placement` for the word "fk".
+#: Each key is the suggested command, and the value lists the words.
 _SYNONYMS = _by_word(
     {
         "--help": "help usage man",
@@ -246,6 +249,6 @@ def main() -> None:
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
-    # The last line of the output already states this warning.
+    # The last line of the output already states what is not verified, so this warning is hidden.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

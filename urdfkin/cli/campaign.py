@@ -150,7 +150,7 @@ def _show_bar(estimator: SpeedEstimator) -> Iterator[Progress]:
 
 
 _MAX_FAILED = 20
-#: Maximum number of chunks that `status` reads for its estimate
+#: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
 _MAX_CHUNKS = 200
 
 

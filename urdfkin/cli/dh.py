@@ -156,10 +156,10 @@ form_options = combine(
 
 
 #: Options that cannot be combined with --like.
-#: With --like, a published table determines these options.
+#: With --like, a published table determines the values of these options.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: With a table instead of a robot, these options derive a new table.
+#: If ROBOT is a Denavit-Hartenberg table, only these options make the command derive a new table.
 _DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

@@ -54,10 +54,10 @@ from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: Formats with the result of the check below the table
+#: Formats in which the result of the check is printed below the table
 _PRINTED = ("terminal", "markdown")
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Significant digits of base and tool transforms.
+#: Number of significant digits of the base and tool transforms in formats with rounded numbers.
 #: None means the value of --digits.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
@@ -150,7 +150,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
         table = read_table_or_screws(expand_home(request.unchanged))
-        # For screws, the call of `Robot.dh` below derives a table.
+        # If the file contains screws, the call of `Robot.dh` below derives a table.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None

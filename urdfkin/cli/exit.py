@@ -115,7 +115,7 @@ def _report_usage_error(error: click.ClickException) -> int:
 
 def report_crash(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # For example, pre-commit may install urdfkin with --no-deps.
+        # A dependency can be missing, for example if pre-commit installed urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
         click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2

@@ -45,7 +45,7 @@ _LANGUAGES_OF_SUFFIXES = {
     ".hpp": "cpp", ".hh": "cpp", ".hxx": "cpp", ".cpp": "cpp", ".cc": "cpp", ".cxx": "cpp",
     ".cuh": "cuda", ".cu": "cuda", ".py": "numpy", ".m": "matlab", ".tex": "latex",
 }  # fmt: skip
-#: Common names of languages, with the names of --to.
+#: Common names of languages and libraries, each with the name that --to accepts.
 _COMMON_NAMES = {
     "c++": "cpp", "python": "numpy", "pytorch": "torch", "octave": "matlab", "tex": "latex", "cu": "cuda",
 }  # fmt: skip

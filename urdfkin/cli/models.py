@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
-#: A version of git, such as HEAD~1, main^ or HEAD:arm.urdf
+#: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
+#: `urdfkin diff` does not treat a revision as a file.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 

@@ -190,7 +190,7 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            # Devices and pipes are written directly.
+            # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):

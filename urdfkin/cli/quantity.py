@@ -256,7 +256,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
 
 
 #: Headings of the first column of CSV output.
-#: The heading is "t" for samples with times.
+#: The heading is "t" if the samples have times, otherwise "sample".
 _TIME = ("sample", "t")
 
 

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 #: Pattern of the names that completion offers.
 #: Names without characters that a shell interprets.
-#: Bash separates words at colons, so colons do not match.
+#: Bash separates words at colons, so names with colons do not match.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size of a file for shell completion, bytes
+#: Maximum size (bytes) of a file from which shell completion reads frame names
 _MOST_BYTES = 10_000_000
-#: XML elements that define frames; in a URDF, children of the root.
+#: XML elements that define frames. In a URDF, only children of the root element define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 

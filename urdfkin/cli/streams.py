@@ -34,7 +34,7 @@ def prepare_streams() -> None:
     sys.stdout = _report_write_errors(sys.stdout, 1)
     sys.stderr = _report_write_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about degrees.
+    # Commands print their own line about joint values that look like degrees.
     # Therefore, DegreesWarning is hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
@@ -116,7 +116,7 @@ def _show_warning(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Escape sequences of rich for colours and progress bars
+#: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
 #: Maximum number of stored characters of an unfinished line.
 #: A longer line is stored only in part.
@@ -189,7 +189,8 @@ class SafeStream:
         whole = self._line + piece
         at = [m.start(1) for command in CI_COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
         # Only the last 16 characters of a long line are stored.
-        # The "x" in front prevents a CI command at the line's beginning.
+        # An "x" is added in front of the characters.
+        # Without the "x", a line could begin with a CI command.
         is_long = len(whole) > _MAX_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return (

@@ -220,7 +220,7 @@ def _import_file(path: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # At the end of sys.path, the folder's files cannot replace installed modules.
+    # The folder is at the end of sys.path, so that its files cannot replace installed modules.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

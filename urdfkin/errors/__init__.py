@@ -142,11 +142,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # Names from files must not add lines or terminal commands.
+        # A name from a file must not add lines or terminal commands to the message.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # Python's own `__reduce__` loses keyword arguments.
+        # `validate --jobs` pickles errors, and Python's own `__reduce__` loses keyword arguments.
         return _unpickle_error, (type(self), self.__dict__)
 
 

@@ -21,7 +21,7 @@ from urdfkin.errors.escape import (
 #: Characters that draw the branches of a tree before a name.
 TREE_LINES = "├│└ "
 ASCII_TREE_LINES = str.maketrans("├│└", "+|`")
-#: Smaller fractions of the table's largest number are displayed as 0.
+#: Numbers below this fraction of the table's largest number are displayed as 0.
 NOISE_FRACTION = 1e-15
 
 

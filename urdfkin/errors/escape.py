@@ -15,12 +15,15 @@ from typing import Any
 
 #: First characters that make a spreadsheet cell a formula.
 FORMULA_STARTS = ("=", "+", "-", "@")
-#: Command of Azure or TeamCity; group 1 is escaped.
+#: Pattern of a command of Azure or TeamCity, anywhere in a line.
+#: Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: Commands of CI services; GitHub's commands begin a line.
+#: Patterns of the commands of all CI services.
+#: GitHub's commands are at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: A word joiner prevents Markdown links, mentions and issue numbers.
+#: Invisible character (word joiner).
+#: The character prevents Markdown links, mentions and issue numbers.
 _WORD_JOINER = "&#8288;"
 
 

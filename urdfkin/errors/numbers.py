@@ -11,13 +11,16 @@ import math
 import re
 from typing import NamedTuple
 
-#: A decimal number; matching takes linear time.
+#: Pattern of a decimal number.
+#: The matching time is linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-#: Maximum length; Python converts long integers in quadratic time.
+#: Maximum number of characters of a number.
+#: Python converts long integers in quadratic time.
 _MAX_LENGTH = 2000
 
-#: Invalid numbers with their remedies; the first match counts.
+#: Patterns of invalid numbers, each with the remedy for the message.
+#: If several patterns match, the first pattern determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),

@@ -83,5 +83,5 @@ def safe_repr(value: object) -> str:
         text = repr(value)
         return text if len(text) <= 60 else f"{text[:57]}..."
     except Exception:
-        # For example, repr raises ValueError for 5,000 digits.
+        # For example, the repr of an int with 5,000 digits raises ValueError.
         return f"an object of type {type(value).__name__}"

@@ -15,8 +15,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
-#: Estimated noise is at least the rounding error.
-#: Below this `noise_ratio`, residuals are only rounding errors.
+#: If the user states no noise, the noise is estimated.
+#: The estimate is at least the rounding error.
+#: Below this `noise_ratio`, the report calls the residuals rounding errors.
 _ROUNDING = 0.5
 
 

@@ -37,14 +37,17 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports, and of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of runs in the list of robots.
-#: Number of runs in the charts.
+#: The list of robots shows the verdicts of the latest MARKED_RUNS runs.
+#: The charts of the page show the latest CHARTED_RUNS runs.
 MARKED_RUNS, CHARTED_RUNS = 20, 60
-#: Maximum number of listed changes, the latest first.
-#: On a terminal, --all removes this limit.
+#: Maximum number of changes between runs on the HTML page.
+#: The page lists the latest changes first.
+#: On a terminal, the limit applies to changes and to runs.
+#: On a terminal, the option --all removes the limit.
 SHOWN = 20
 _MAX_LISTED = 500
-#: Symbol of each verdict; "" for a run without the robot.
+#: Symbol of each verdict on a robot.
+#: The key "" is for a run without the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0

@@ -57,12 +57,14 @@ if TYPE_CHECKING:
 #: Readers can open and close the details of a robot.
 #: Up to this number of robots, all details are open at first.
 _OPEN = 1
-#: Maximum number of unverified robots with open details.
+#: Maximum number of unverified robots whose details the page shows at first.
 _FAILURES_OPEN = 20
-#: Larger reports have no histograms for verified robots.
-#: The histograms of one robot take a second.
+#: If a report has more robots than this number,
+#: verified robots have no histograms.
+#: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
-#: Above this number of characters, each robot has a separate file.
+#: If the details of all robots have more characters than this number,
+#: each robot has a separate file.
 MOST = 5_000_000
 
 
@@ -297,7 +299,7 @@ class NotebookView:
         )
 
     def _repr_html_(self) -> str:
-        # The frame runs its scripts, without access to the notebook.
+        # The HTML frame may run its own scripts but cannot access the notebook.
         return (
             f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
             f' style="width:100%;height:{self._height}px;border:0"></iframe>'

@@ -35,7 +35,8 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
-#: Tolerance of rotation matrices and unit axes: robot files may have only 6 digits.
+#: Tolerance of rotation matrices and unit axes.
+#: A robot file may have only 6 digits.
 _ROUNDED = 1e-5
 
 
@@ -130,7 +131,8 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
 
 
 _TOLERANCE = 1e-9
-#: Maximum number of results; doubles represent all integers up to this number.
+#: Maximum number of results.
+#: A double represents all integers up to this number.
 _MOST = 2**53
 
 

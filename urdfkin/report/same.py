@@ -32,7 +32,8 @@ from urdfkin.report.markdown import table_lines
 from urdfkin.report.words import format_count
 from urdfkin.robot import Robot
 
-#: Maximum number of printed lines per kind of difference.
+#: Maximum number of printed lines for each kind of difference.
+#: The option --all removes the limit.
 SHOWN = 12
 #: Message for different models with different joint names or orders.
 GUESSED = (
@@ -41,8 +42,9 @@ GUESSED = (
 )
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
-#: Distances and angles up to FACTOR times the rounding bound are not printed.
-#: The factor covers sums of several terms.
+#: Distances and angles up to a limit are not printed.
+#: The limit is FACTOR times the bound on rounding errors.
+#: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
 #: Heading for mimicked joints whose range is too large for a mimic joint.
 #: Such a joint moves a mimic joint beyond its limits.
@@ -343,14 +345,14 @@ def markdown_of(sameness: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(sameness.confirmation)), ""])
 
 
-#: `HALF`: half the side length of a picture, SVG units.
-#: `FILLED`: width or height of the drawn robots, relative to the picture.
+#: `HALF` is half the side length of a picture, in units of the SVG.
+#: The drawn robots are `FILLED` times as wide or as high as the picture.
 HALF, FILLED = 150.0, 0.9
-#: Maximum length of the scale bar, in side lengths.
+#: Maximum length of the scale bar, relative to the side length of a picture.
 MAX_SCALE_BAR = 0.3
-#: Distance of the scale bar from the lower edge, SVG units.
+#: Distance of the scale bar from the picture's lower edge (SVG units).
 SCALE_BAR_MARGIN = 6.0
-#: Length of axes in the close view, relative to the frames' distance.
+#: Length of the axes in the close view, relative to the distance between the two frames.
 AXIS_LENGTH = 0.35
 #: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
@@ -459,7 +461,8 @@ def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # Projection of a point: x points right, y points down.
+    # Matrix that projects a point in space into the picture.
+    # In the picture, x points to the right, and y points down.
     projection = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ projection.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

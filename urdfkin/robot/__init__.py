@@ -74,11 +74,12 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations for the generic rank.
+#: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
 #: `dir(robot)` omits these internal members.
 _INTERNAL_NAMES = {"plan", "verifier"}
-#: Maximum number of float64 values: the bytes fit in 63 bits.
+#: Maximum number of float64 values in an array.
+#: The number of bytes must fit in 63 bits.
 _MAX_NUMBERS = (2**63 - 1) // 8
 
 
@@ -160,9 +161,12 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds of pose errors from a USD stage's single precision; None without a stage.
+        #: Bounds on the errors of poses from a USD stage.
+        #: The stage stores poses in single precision.
+        #: Without a USD stage, the value is None.
         self.single: SinglePrecisionErrors | None = None
-        #: USD path of each link's prim (scene object); empty without a stage.
+        #: USD path of each link's prim (scene object).
+        #: Without a USD stage, the value is empty.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -825,7 +829,8 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
-        # Subclasses of str may print names differently.
+        # Subclasses of str may print names differently in error messages.
+        # A plain str avoids the difference.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flatten_out(out, (4, 4))
@@ -1682,10 +1687,10 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        # The key of a plain str and the default reference is this str.
-        # Hashing an enumeration member is slow.
-        # Every other key contains the class of `frame`.
-        # `LinkFrame("link:a")` equals "link:a", but can name another frame.
+        # A plain str with the default reference is its own key.
+        # Such a key needs no slow hash of an enumeration member.
+        # Every other key contains the class of `frame`, for example `LinkFrame`.
+        # `LinkFrame("link:a")` equals "link:a", but can name a different frame.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

@@ -115,9 +115,11 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 
 #: Minimum number of samples; a second difference needs three.
 _MIN_SAMPLES = 3
-#: .npz arrays for the pose, velocity and acceleration of the root.
+#: Names of the .npz arrays for the root link's motion:
+#: pose, velocity and acceleration.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Fraction of the smallest time step; larger rounding of times causes a note.
+#: Maximum rounding of times that causes no note to the user,
+#: as a fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
@@ -215,8 +217,8 @@ def make_line_trajectory(
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # v = s' * step, a = s'' * step.
-    # s', s'': first and second time derivative of s.
+    # The velocity v is s' * step, and the acceleration a is s'' * step.
+    # Here s' and s'' are the first and the second time derivative of s.
     # The same formulas hold for planar and floating joints.
     # `step` is the joint's constant twist in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
@@ -310,7 +312,7 @@ def complete_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _MIN_SAMPLES - 1:
         half = slice(None, None, 2)
         coarse = _central_differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # The error of a is proportional to h^order, h the time step.
+        # With the time step h, the error of a is proportional to h^order.
         order = 1 if x.v is None else 2
         errors = _estimate_error(v[half], coarse[0], 2), _estimate_error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -604,15 +606,19 @@ def _check_columns(
         )
 
 
-#: Angles with a larger difference (rad) are not wrapped.
-#: One turn, plus a margin for rounding to two decimals.
+#: If a joint's angles differ by more than this number (rad),
+#: the angles are not wrapped.
+#: The number is one turn plus a margin.
+#: The margin covers angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: After a larger step (rad), the direction of rotation is uncertain.
+#: If a joint turns by more than this angle (rad) between samples,
+#: the direction of rotation is uncertain.
 #: Rotations by 130 and by -230 degrees lead to the same pose.
-#: Above 120 degrees, the other rotation is less than twice as large.
+#: Above 120 degrees, the longer rotation is below twice the shorter rotation.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: Larger differences of mimic joints (rad or m) are no rounding errors.
+#: Maximum difference (rad or m) in the value of a mimic joint
+#: that counts as a rounding error.
 #: For a multiplier m with |m| > 1, the limit is |m| times this value.
 _MIMIC_ROUNDING = 1e-9
 

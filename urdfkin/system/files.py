@@ -44,7 +44,7 @@ def apply_edits(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Maximum time to wait for the process at the other end of a named pipe, s.
+#: Maximum time to wait for a process that opens the other end of a named pipe, s.
 PIPE_TIMEOUT = 10.0
 #: Maximum size of a robot, table, settings or cached file, bytes.
 MAX_BYTES = 100_000_000
@@ -71,7 +71,7 @@ def read_bytes(path: Path, max_bytes: int = MAX_BYTES, *, pipes: bool = False) -
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
     """Return the first bytes of a file, at most `count` bytes; `pipes` is as in `read_bytes`."""
     try:
-        # O_NONBLOCK: opening a pipe does not wait for a writer.
+        # Without O_NONBLOCK, opening a pipe blocks until a writer opens the pipe.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         try:
             kind = os.fstat(descriptor).st_mode
@@ -211,7 +211,7 @@ def _read_first_of_pipe(descriptor: int, path: Path) -> bytes:
         # A writer is connected, but has written nothing yet.
         except BlockingIOError:
             return b""
-        # POLLHUP: a writer has connected and closed the pipe.
+        # POLLHUP means that a writer has connected and then closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)

@@ -88,7 +88,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # git must not fetch, prompt, page or translate.
+    # These variables prevent git from fetching, prompting, starting a pager or translating messages.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",

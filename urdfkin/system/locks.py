@@ -65,7 +65,7 @@ class ImportLock:
             return
         with self._lock:
             if not self._registered:
-                # The class docstring explains why `logging` comes first.
+                # The class docstring explains why `logging` is imported before the registration.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

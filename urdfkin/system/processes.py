@@ -19,6 +19,7 @@ from urdfkin.system.locks import make_fork_safe_lock
 
 #: Environment variables that a Python interpreter may need to start.
 _INHERITED_VARIABLES = ("LD_LIBRARY_PATH",)
+#: Linear algebra uses a single thread.
 #: A confined process has little address space for threads.
 _EXTRA_VARIABLES = {"OPENBLAS_NUM_THREADS": "1"}
 
@@ -33,7 +34,7 @@ def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 
 def _import_path() -> list[str]:
-    # Empty and relative entries refer to the current folder.
+    # Empty and relative entries of `sys.path` refer to the current folder.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)), home]
 

@@ -33,7 +33,7 @@ _HARMLESS_EVENTS = {
     "object.__getattr__",
     "sys._getframe",
 }
-#: Audit events that need a permitted file.
+#: Audit events that are allowed only for files that the process may read.
 _READ_EVENTS = {"open", "os.listdir", "os.scandir"}
 _WRITE_FLAGS = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -119,7 +119,7 @@ def limit_process(seconds: int) -> None:
         resource.RLIMIT_NOFILE: 64,
         resource.RLIMIT_CORE: 0,
     }
-    if sys.platform == "darwin":  # macOS does not support this limit.
+    if sys.platform == "darwin":  # macOS does not support a limit on the address space.
         del bounds[resource.RLIMIT_AS]
     for kind, most in bounds.items():
         hard = resource.getrlimit(kind)[1]

@@ -174,7 +174,7 @@ class _Evaluation:
             return
         loop, *others = loops
         for value in self.value(loop.iter):
-            # A copy would evaluate all xacro properties, even unused ones.
+            # Copying `self._names` would evaluate all xacro properties, even unused properties.
             scope = ChainMap(dict(_bind_targets(loop.target, value)), self._names)  # type: ignore[arg-type]
             inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):

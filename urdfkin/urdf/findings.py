@@ -31,7 +31,7 @@ from urdfkin.errors.escape import escape_unprintable, log_line
 from urdfkin.system.files import Edit, apply_edits
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
-#: Maximum number of quoted characters of a file.
+#: Maximum number of characters of a file that a message quotes.
 MAX_QUOTE_LENGTH = 60
 
 
@@ -93,7 +93,8 @@ def _display_width(text: str) -> int:
     )
 
 
-#: Bound of the rounding error of an angle up to one revolution, rad.
+#: Upper bound (rad) on the rounding error of an angle.
+#: The angle is at most one revolution.
 SAFE_ROTATION = 2.0**-50
 
 
@@ -415,20 +416,23 @@ class CommentIndex:
         return None
 
 
-#: Maximum number of searches for similar names in a file.
+#: Maximum number of misspelt names in a file that get suggestions.
 MAX_SEARCHES = 20
-#: Limits of one search: names, and compared pairs of characters.
+#: Limits of one search for similar names:
+#: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: Minimum number of warnings or notes with one code that become one finding.
+#: If a code has at least `MIN_FOLDED` warnings or notes,
+#: one finding represents all of them.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
-#: URDF7xx: inertials, shapes, meshes and materials, without effect on kinematics.
+#: The codes URDF7xx refer to inertials, shapes, meshes and materials.
+#: Kinematics does not use these elements.
 MIN_FOLDED, MIN_FOLDED_EXTRAS = 4, 2
 
-#: Maximum number of separately reported errors with one code.
+#: Maximum number of errors with the same code that are reported separately.
 MAX_ERRORS_PER_CODE = 100
 
-#: Maximum number of stored findings per code and severity.
+#: Maximum number of findings with one code and severity that are stored completely.
 #: For further findings, only the line numbers are stored.
 MAX_COMPLETE_FINDINGS = 10_000
 
@@ -624,8 +628,9 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: An attribute value with a tab, a line end or a reference such as `&amp;`.
-#: XML parsers replace these characters.
+#: Pattern of an attribute value with a tab, line end or reference.
+#: A reference is, for example, `&amp;`.
+#: XML parsers replace tabs, line ends and references in attribute values.
 #: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 

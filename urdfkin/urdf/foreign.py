@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Maximum number of joint names in a finding.
 _MAX_NAMES = 5
 
-#: Placeholder element of records that come from no file.
+#: Placeholder for the XML element in records that do not come from a file.
 _NO_ELEMENT = Element("", {}, None, 0, 0, 0)
 
 
@@ -134,8 +134,9 @@ def _serialize(root: Any) -> str:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-#: Pinocchio's joint classes with the axis x, y or z.
-#: R: revolute, RUB: revolute without limits, P: prismatic.
+#: Names of Pinocchio's joint classes whose axis is x, y or z.
+#: R is a revolute joint, and P is a prismatic joint.
+#: RUB is a revolute joint without limits.
 _ALIGNED_CLASS = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,

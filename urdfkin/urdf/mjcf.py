@@ -43,7 +43,8 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import expand_home, read_start
 from urdfkin.urdf.mujoco import compile_spec, import_mujoco
 
-#: Limit of a prismatic joint without limits, m; URDF requires limits.
+#: Limit (m) that replaces a missing limit of a prismatic joint.
+#: URDF requires limits.
 SLIDE_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT_ELEMENT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
@@ -350,7 +351,8 @@ def is_text(source: object) -> bool:
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
-#: Lists of MuJoCo's model that kinematics does not use, with the singular of each name.
+#: Lists of MuJoCo's model that kinematics does not use.
+#: Each name is paired with the singular of the name.
 _SINGULAR = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
@@ -407,8 +409,9 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
         site.material = ""
     for joint in spec.joints:
         # The next loop replaces all inertias by placeholders.
-        # `align` would align the body frame with the inertial frame.
+        # With `align`, MuJoCo would align a body's frame with its inertial frame.
         # The inertia is only a placeholder.
+        # Therefore, `align` is switched off.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)

@@ -67,7 +67,7 @@ _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Encodings in which ASCII characters are as in UTF-8.
+#: Names of encodings in which ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
@@ -167,7 +167,7 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Maximum depth of elements in older versions of libxml2.
+#: Maximum depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
 
 #: Number of bytes that expat parses in one call.
@@ -246,7 +246,7 @@ class _Builder:
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
-            # In an incomplete tag, `CurrentByteIndex` is the first byte's position.
+            # If a tag or comment is incomplete, `CurrentByteIndex` is the position of its first byte.
             if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
                 found = f"more than {self.limits.markup} bytes without an end"
                 self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
@@ -541,7 +541,8 @@ class NumberReader:
         )
 
 
-#: Messages about invalid numbers name only the attribute of these elements.
+#: For these elements, a message about an invalid number
+#: names only the attribute.
 #: For other elements, the message also names the element.
 _ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
@@ -785,7 +786,7 @@ class JointReader:
             return  # Rule URDF212 reports text between tags.
         message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
-        # A planar joint moves in its frame's XY plane, whatever the axis is.
+        # A planar joint moves in the XY plane of its frame, independent of the axis.
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
@@ -856,5 +857,6 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: Longer words are not similar to any name of URDF.
+#: If a word has more characters than this number,
+#: the word is not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

@@ -55,7 +55,7 @@ def _make_joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # `rotation_from_rpy` would check the numbers again.
+    # `rotation_from_rpy` is not called, because it would check the numbers again.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -87,8 +87,8 @@ def _normalize(axis: FloatArray, joint: str) -> FloatArray:
 def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    # In urdfdom, a missing position limit is zero.
-    # Position limits of a continuous joint have no effect.
+    # In urdfdom, the default of a position limit is zero.
+    # In the URDF specification, position limits of a continuous joint have no effect.
     return Limit(
         lower=(limit.lower or 0.0) if kind.has_limits else -math.inf,
         upper=(limit.upper or 0.0) if kind.has_limits else math.inf,

@@ -10,7 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Maximum depth of elements that Pinocchio reads.
+#: Maximum depth of nested elements in a URDF that Pinocchio reads.
+#: Pinocchio's XML parser is tinyxml2.
 #: tinyxml2 counts the document as level 1, and refuses level 500.
 ORACLE_DEPTH = 498
 

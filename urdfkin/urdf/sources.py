@@ -232,7 +232,7 @@ def _read_string(source: str, max_bytes: int) -> UrdfText:
 
 def _resolve_package_uri(name: str, path: str) -> Path:
     """Return the file of a `package://` address; raise SourceError for an unknown package."""
-    # The search goes upwards from the current folder.
+    # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -245,7 +245,7 @@ def _resolve_package_uri(name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> UrdfText:
-    # A later check reports lone surrogates.
+    # `encode` must accept a lone surrogate, because the later check of the bytes reports it.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return UrdfText(data, label, source)
 

@@ -555,7 +555,7 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # "physxMimicJoint:rotX:referenceJoint" may name another direction than the joint's.
+            # The direction in "physxMimicJoint:rotX:referenceJoint" may differ from the joint's direction.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -567,7 +567,7 @@ class _StageReader:
             if not any(word in schema for word in _COUPLING_WORDS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # MjcEqualityJointAPI may add nonlinear terms to NewtonMimicAPI.
+                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add nonlinear terms.
                 if more := [name for name in _NONLINEAR_COEFFICIENTS if self._read_value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._report("left-out-of-usd", path, what)
@@ -621,8 +621,10 @@ class _StageReader:
             return None
         kind, axis, limits, free = self._read_motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
-        # A and B: poses relative to a body, or to a world with z up.
-        # `UsdJoint`: poses relative to a body, or to the stage's world, in which y may be up.
+        # A and B are poses relative to a body or a world.
+        # In this world, z is up.
+        # `UsdJoint` contains poses relative to a body or the stage's world.
+        # In the stage's world, y may be up.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._joints_read[path] = UsdJoint(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -810,7 +812,7 @@ class _StageReader:
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
-                continue  # One body that is fixed to the world is no robot.
+                continue  # A single body that is fixed to the world is not a robot.
             self._set_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
         articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
@@ -978,7 +980,7 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, joint and child link have the same frame.
-        # For another child frame, the joint moves an additional link.
+        # If their frames differ, the joint moves an additional link.
         # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between

@@ -77,7 +77,8 @@ def _find_included_file(name: str, referring_file: Path, find: FindPackage) -> P
     return folder / name
 
 
-#: Maximum time of an expansion, s; macros may call themselves without end.
+#: Maximum time of an expansion (s).
+#: A macro may call itself without end.
 PATIENCE = 60.0
 
 #: Maximum size of the expanded URDF in bytes.

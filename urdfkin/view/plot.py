@@ -213,11 +213,11 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 #: Width and maximum height of a figure, in inches.
 #: This size fits on A4 and US Letter with a margin.
 _PAGE = (7.6, 10.4)
-#: Heights of a panel, and of title and footer, inches.
+#: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
 #: Letters per inch in the footer and in a legend.
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
-#: Width of line sample and gaps in a legend entry, in letters.
+#: Width of the line sample and the gaps in a legend entry. The unit is the width of one letter.
 _HANDLE = 8
 _VELOCITIES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"

@@ -22,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import parse_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size of a mesh, material or texture file, bytes.
+#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown.
 LARGEST_FILE = 200_000_000
 
 
@@ -198,7 +198,7 @@ def _candidates(address: str, urdf_file: Path | None) -> Iterator[Path]:
     if not address or "\0" in address:
         return
     if (parts := split_uri(address)) is not None:
-        # Some URDFs write package:///NAME.
+        # Some URDFs have a third slash before the package's name: package:///NAME.
         name, path = parts if parts[0] else parts[1].partition("/")[::2]
         package = find_package(name, urdf_file)
         if package is not None:

@@ -67,8 +67,9 @@ def open_page(address: str) -> Iterator[None]:
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
 #: Headers of every response.
-#: No caching, no guessed content types, no embedding.
-#: The address contains the key, so browsers send no Referer.
+#: The headers forbid caching, guessing the content type, and embedding the page.
+#: The page's address contains the key.
+#: Therefore, browsers must not send the address as Referer.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -170,7 +171,7 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only accepted message from a page: a changed control.
+#: The only message that the server accepts from a page: a control has changed.
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Two replacements in viser's page.
 #: The first replacement adds the nonce to viser's script.

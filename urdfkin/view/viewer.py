@@ -38,15 +38,16 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) from this size count as unlimited.
+#: Joint ranges (rad, m) of at least this size count as unlimited.
+#: The number also applies to velocity limits (rad/s, m/s).
 _UNLIMITED = 100.0
-#: Step of an angle's slider, degrees or radians.
+#: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider for a length.
 #: A step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Largest velocity of a slider for joints without limit, rad/s or m/s.
+#: Largest joint velocity (rad/s, m/s) of a slider if the joint has no velocity limit.
 #: Largest joint acceleration (rad/s^2, m/s^2) of a slider.
 _VELOCITY, _ACCELERATION = 3.0, 5.0
 #: Maximum number of missing meshes that a message names.
@@ -137,7 +138,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # The conversion to degrees could change the last digits.
+                # Without this test, the conversion to degrees could change the last digits of a slider.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -490,7 +491,7 @@ class Viewer:
                     words = f"{self._table.base_frame} to {self._table.tip_frame}"
                 except UrdfkinError as error:
                     words = str(error)
-            # Viser would load images even inside Markdown code.
+            # Viser would load images even inside Markdown code, so all characters are escaped.
             self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:

@@ -35,10 +35,11 @@ from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, Robot
 from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
-#: The fixes of one pass have the same code.
+#: The fixes of one pass do not overlap.
+#: The findings of these fixes have the same code.
 MAX_PASSES = 100
 
-#: Bound of the rotation of a unit vector by rounding to doubles, rad.
+#: Maximum angle (rad) by which rounding to doubles rotates a unit vector.
 MAX_AXIS_TILT = Fraction(1, 2**52)
 
 
@@ -92,7 +93,7 @@ def fix_text(
 
 def _find_objections(before: Examination, after: Examination, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # For very frequent codes, `findings` is incomplete.
+    # `findings` contains only some findings of a very frequent code. Such codes are not compared.
     many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -125,7 +126,8 @@ def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str,
 
 
 def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str | None:
-    # A change of roll, pitch or yaw rotates the frame at most this much.
+    # A change of roll, pitch or yaw by an angle
+    # rotates the frame by at most the same angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
@@ -170,7 +172,8 @@ def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
 
 #: Bytes per line of git's binary patch.
 _BYTES_IN_A_LINE = 52
-#: First letters of lines in git's binary patch, for the number of bytes.
+#: First letters of the lines in git's binary patch.
+#: A letter encodes the number of bytes of the line.
 _LENGTH_LETTERS = string.ascii_uppercase + string.ascii_lowercase
 
 
@@ -192,7 +195,7 @@ def _relative_path(file: str) -> str:
 
 
 def _make_unified_diff(name: str, before: bytes, after: bytes) -> str:
-    end = "\t" if " " in name else ""  # Git needs a tab after names with spaces.
+    end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends lines only at line feeds.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))

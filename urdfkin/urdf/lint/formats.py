@@ -96,7 +96,8 @@ def _uri(file: str) -> str:
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON format; it changes if a field is removed or changes its meaning.
+#: Version of the JSON format.
+#: The number changes if a field is removed or changes its meaning.
 JSON_VERSION = 1
 
 

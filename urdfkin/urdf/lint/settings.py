@@ -37,7 +37,8 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examination, find_local_path
 from urdfkin.urdf.sources import UrdfText, is_xacro, unambiguous_path
 
-#: Version of the baseline format; it changes if a field is removed or changes its meaning.
+#: Version of the baseline format.
+#: The number changes if a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -126,7 +127,9 @@ _TYPE_NAMES = {
     str: "a string",
 }
 
-#: Patterns of robot files; most .xacro files describe only parts.
+#: Default patterns of robot files.
+#: Most .xacro files describe only a part of a robot.
+#: The patterns therefore exclude .xacro files.
 DEFAULT_INCLUDE = ("*.urdf",)
 
 
@@ -248,7 +251,7 @@ class FindingFilter:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding, so `any` is wrong.
+            # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
             return selected and not sum(baseline.consume(finding) for baseline in known)
 
         return is_reported
@@ -279,7 +282,8 @@ def find_known_findings(
         return Baseline(Counter())
     if is_xacro(text.source):
         # urdfkin cannot expand the older xacro file.
-        # After a change of the xacro file or an includable file, all findings count as new.
+        # All findings count as new after a change of the xacro file.
+        # The same applies to files that the xacro file may include.
         is_new = not version.contains(read_bytes(path))
         return Baseline(Counter()) if is_new or version.has_changes(_INCLUDABLE_SUFFIXES) else None
     is_unchanged = version.contains(text.data)

@@ -19,15 +19,15 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: Largest plausible coordinate of a centre of mass, m.
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
-#: A smaller nonzero mass (kg) is probably a placeholder.
-#: Such a body's moments of inertia are not checked.
+#: A nonzero mass (kg) below this number is probably a placeholder.
+#: The moments of inertia of such a body are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance of moments of inertia per mass, m^2.
-#: Smaller moments belong to bodies below about 0.03 mm.
+#: Tolerance for moments of inertia per kg of a body's mass (m^2).
+#: Only bodies below about 0.03 mm have moments below the tolerance.
 NEGLIGIBLE_MOMENT = 1e-9
 
-#: Relative rounding error of moments of inertia.
+#: Relative rounding error of the moments of inertia in a file.
 #: Exporters write moments of inertia with few digits.
 _MOMENT_PRECISION = 1e-6
 
@@ -132,7 +132,8 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of shapes: name, count, whether required.
+#: Numeric attributes of each shape:
+#: name, count of numbers, and whether the attribute is required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Only macros inside <robot> or a joint can change the kinematics.
+    # Only macros directly inside <robot> or inside a joint can change kinematics.
     if _report_xacro(
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
     ):
@@ -95,7 +95,8 @@ _EXPAND_REMEDY = (
     f"expand the file first: xacro FILE > robot.urdf, or {install_command('xacro')} and pass the .xacro file"
 )
 
-#: An element and an attribute; None means the element itself.
+#: An element and the name of an attribute.
+#: The name None means the element itself.
 _Occurrence = tuple[Element, str | None]
 
 
@@ -152,8 +153,8 @@ _COMMON_EXTENSIONS = (
 EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: Without a colon, attributes are not checked.
-#: Elements without a line may have any content.
+#: If a line has no colon, the attributes of the element are not checked.
+#: If an element has no line, its content is not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -382,6 +383,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
+#: Maximum length of names that are not reported.
 #: Longer names break tables and file paths.
 MAX_NAME_LENGTH = 200
 
@@ -443,7 +445,7 @@ def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]
     seen: dict[str, str] = {}
     for name, element in named_elements:
         if name.isascii() or len(name) > MAX_NAME_LENGTH:
-            continue  # URDF405 already reports long names.
+            continue  # Long names are slow to compare, and URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:

@@ -136,21 +136,24 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller errors of an axis length are notes.
-#: Rounding to few digits causes such errors.
+#: If an axis length differs from 1 by less than this number,
+#: the finding is a note.
+#: Rounding the axis to few digits causes such small differences.
 NOTE_LENGTH_ERROR = 2e-4
 
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: Largest xy part of a z axis, relative to z.
+#: An axis with a small xy part counts as the z axis.
+#: The xy part is at most this fraction of the z component.
 _Z_AXIS_TOLERANCE = 1e-9
 
-#: Tolerance with which Pinocchio replaces an axis by a coordinate axis.
-#: This is the default of Eigen's function `isApprox`.
+#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
+#: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: Smaller angles to a coordinate axis (rad) are not reported.
+#: Maximum angle (rad) between an axis and a coordinate axis
+#: that is not reported.
 #: The error bounds in `verify.bounds` cover this difference.
 _NEGLIGIBLE_TILT = 2.0**-52
 
@@ -269,7 +272,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks limits of all joints.
+    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks the limits of all joint types.
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -327,8 +330,9 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier or offset (rad or m) of a mimic joint.
 MAX_MIMIC_NUMBER = 1e6
-#: Fraction of the mimicked joint's range; larger exclusions cause URDF527.
-#: Limits with few digits exclude small fractions.
+#: A mimic joint's limits can exclude part of the mimicked joint's range.
+#: URDF527 reports parts above this fraction of the range.
+#: Limits with few digits often exclude a small fraction of the range.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -502,25 +506,27 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: From this size, coordinates of a joint origin (m) are probably millimetres.
+#: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: Below this total length (m), lengths were probably scaled twice.
+#: If a robot's total length (m) is below this number,
+#: the lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: Limits that are whole numbers from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT` are probably degrees.
+#: A limit is probably in degrees if it is a whole number from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT`.
 #: `PLACEHOLDER_LIMIT` itself is excluded.
-#: For joints without limits, some exporters write limits of `PLACEHOLDER_LIMIT` or more.
+#: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
-#: An angle of 1.57 instead of pi/2 displaces later links.
-#: Larger displacements (m) are warnings.
+#: An angle of 1.57 instead of pi/2 displaces the links after the joint.
+#: The finding is a warning if the displacement exceeds this length (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: Smaller differences from a multiple of pi (rad) are not reported.
+#: Maximum difference (rad) from a multiple of pi that is not reported.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Factor k, and minimum number of decimals of a rounded k * pi.
+#: Pairs of a factor k and a minimum number of decimals.
+#: Angles with fewer decimals do not count as rounded k * pi.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]

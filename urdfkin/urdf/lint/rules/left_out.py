@@ -39,9 +39,9 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Number of bytes that are searched for elements.
+#: Number of leading bytes of a file that are searched for elements.
 _MAX_SEARCHED_BYTES = 10_000_000
-#: Beginnings and ends of XML markup without elements.
+#: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: Tags of MJCF elements whose findings contain no name.
 #: Keys are tags in the file; values are tags in the finding.
@@ -59,7 +59,8 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line, column (from 1) and width of each element.
+#: Line, column and width of each element, by tag and name.
+#: Lines and columns count from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
