@@ -70,8 +70,8 @@ _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
-#: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
+#: Assumed position of a fitted target in the tip's frame, if no poses are given: (L/5, L/6, L/7).
+#: L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -235,8 +235,11 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
-    Pinocchio checks the tip's poses of the written model. A URDF is checked at the measured configurations,
-    and a table at q = 0.
+    Pinocchio checks the tip's poses of the written model:
+
+        written model    configurations of the check
+        URDF             measured configurations
+        table            q = 0
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -254,7 +257,7 @@ def calibrate(
         drop_outliers: Whether to exclude outlier poses from the fit; outliers are always reported.
         full_poses: Whether you will measure full poses, not only positions. Without effect if `poses` is
             given.
-        radians: Whether joint angles of more than one turn are radians, not degrees.
+        radians: True if joint angles of more than one turn are in radians.
         force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
             Without effect if joint values look like degrees. Convert such values, or pass `radians=True` for
             values in radians.

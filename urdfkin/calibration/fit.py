@@ -88,13 +88,13 @@ from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
+#: A Jacobian column is a candidate for the next fitted parameter if
+#:     length of its remainder >= _PIVOT_FRACTION * length of the longest remainder.
 _PIVOT_FRACTION = 0.5
-#: Maximum number of fitted parameters that are named in the reason why a parameter stays fixed.
+#: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The reason lists these fitted parameters.
-#: A fitted parameter that contributes at most this fraction of the effect is not listed.
+#: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -212,7 +212,7 @@ def join_names(names: Iterable[str], limit: int) -> str:
 
 
 #: A fit can be checked if its total redundancy is at least this number.
-#: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
+#: Without rounding errors, the total redundancy is an integer: 0, 1, 2, ...
 _MIN_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
 #: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.
@@ -476,8 +476,8 @@ def select_significant(
 ) -> NDArray[np.bool_]:
     """Select changes of more than `SIGMAS` standard deviations by backward elimination.
 
-    Each step resets the least significant parameter. The reset can make a correlated parameter significant.
-    `fixed` parameters are always selected. Unknown covariances are inf.
+    Each step sets the least significant change to 0, and updates correlated changes. `fixed` parameters are
+    always selected. Unknown covariances are inf.
 
     >>> select_significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]

@@ -2,8 +2,8 @@
 
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Both a joint
 origin of a URDF and a row of a Denavit-Hartenberg table are such products. An elementary motion is a rotation
-by an angle or a translation by a length. A parameter or the value of a joint determines the angle or length.
-A joint can have a gain g:
+by an angle or a translation by a length. The angle or length is a parameter or the value of a joint. A joint
+can have a gain g:
 
     q              value of the joint
     (1 + g) q      angle or length of the joint's motion
@@ -74,7 +74,7 @@ class ParametricMotion(ElementaryMotion):
 
     Attributes:
         parameter: Index of the parameter. For the motion of a joint: index of the gain; None without a gain.
-        joint: Index of the joint; None for the motion of a parameter.
+        joint: Index of the joint; None if the angle or length does not depend on a joint.
         sense: -1 if the path leads from child to parent, or if the row subtracts the joint's value. Else 1.
     """
 
@@ -143,7 +143,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return tip poses and their Jacobian by the parameters.
 
-        `frames` can contain the result of the method `frames` for the same arguments.
+        `frames` is `self.frames(joint_values, parameter_values)`, if already computed.
 
         Returns:
             (s, 4, 4) poses, and (s, 6, p) Jacobian, linear rows first.
@@ -286,7 +286,7 @@ class CalibrationModel:
     def _change(
         self, element: str, parameter_values: FloatArray, *, is_base_or_tool: bool = False
     ) -> FloatArray:
-        """Return the (4, 4) motion by the six parameters of a joint, the base or the tool."""
+        """Return Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz), (4, 4), of a joint, base or tool."""
         parameters = enumerate(self.chain.parameters)
         values = {
             p.name: float(parameter_values[k])
@@ -349,7 +349,7 @@ class _ModelBuilder:
         preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Base and tool have the highest preference, because their values are unknown before the fit.
+        # Base and tool come before the joints, because their values are unknown before the fit.
         # The parameters of the joints are nearly known before the fit.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]

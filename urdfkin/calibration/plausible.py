@@ -1,13 +1,20 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
 Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its rms position error is a large fraction of the robot's reach. This
-limit is lower in two cases: if the error is also a large fraction of the spread of the measured positions,
-and if a fit of base and tool alone is almost as accurate. Other reasons for a refusal are a large orientation
-error, a large tilt of a joint's axis, a large gain, missing redundancy, and joint values that look like
-degrees. To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the
-data, one at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the
-likeliest one.
+joint is reversed. A fit is refused for any of these reasons:
+
+- The rms position error is a large fraction of the robot's reach.
+- The rms position error is a smaller fraction of the reach, but a large fraction of the spread of the
+  measured positions.
+- The rms position error is a smaller fraction of the reach, but a fit of base and tool alone is almost as
+  accurate.
+- The orientation error, the tilt of a joint's axis, or the change of a gain is large.
+- The fit has no redundancy.
+- Joint values look like degrees.
+
+To find the mistake behind a refused or suspicious fit, the module corrects common mistakes in the data, one
+at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
+one.
 """
 
 from __future__ import annotations
@@ -34,17 +41,17 @@ from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, far_limits
 
-#: Fraction of the reach above which the rms position error of a fit is not plausible.
+#: The rms position error of a plausible fit is at most this fraction of the reach.
 _LARGE_ERROR = 0.05
-#: A fit is not plausible if its error is a large fraction of the spread of the measured positions.
-#: The rms position error of such a fit exceeds two limits.
-#: The first limit is the first number times the reach.
-#: The second limit is the second number times the rms distance of the measured positions from the mean.
+#: A fit is not plausible if its error is a large fraction of the spread of the measured positions:
+#:     error > _UNEXPLAINED_OF_REACH * reach and error > _UNEXPLAINED_OF_SPREAD * spread
+#:     error     rms position error
+#:     spread    rms distance of the measured positions from their mean
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: A fit is not plausible if it hardly reduces a large error.
-#: The rms position error of such a fit exceeds two limits.
-#: The first limit is the first number times the reach.
-#: The second limit is the second number times the rms position error of a fit of base and tool alone.
+#: A fit is not plausible if it hardly reduces a large error:
+#:     error > _NO_BETTER_OF_REACH * reach and error > _NO_BETTER_OF_BEFORE * error_before
+#:     error           rms position error
+#:     error_before    rms position error of a fit of base and tool alone
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
@@ -57,20 +64,19 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
 #: Two configurations with equal rounded values count as one configuration.
 _ONE_CONFIGURATION = 1e-6
-#: Number of standard deviations that are subtracted from a parameter's change.
-#: The remainder is compared with a limit.
-#: For this reason, an uncertain change does not make a fit implausible.
+#: The change of a parameter is implausible if
+#:     |change| - _UNCERTAIN * (standard deviation) > limit.
+#: Therefore, an uncertain change does not make a fit implausible.
 #: For example, the tilt of an axis is uncertain if only positions of a target near this axis are measured.
 _UNCERTAIN = 5.0
-#: After a correction of the data, the error of the new fit is compared with the error of the original fit.
-#: The new error must be at most a factor times the original error.
-#: The factor is `_NOT_WORSE` if the original fit is not plausible, or changes a joint's zero by half a turn.
-#: For a plausible original fit with a suspiciously large error, the factor is `_BETTER`.
+#: After a correction of the data, the error of the new fit must be at most
+#:     _NOT_WORSE * (original error)    if the original fit is implausible
+#:     _NOT_WORSE * (original error)    if the original fit changes a joint's zero by about half a turn
+#:     _BETTER * (original error)       otherwise
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
-#: For every correction, the module first computes base and tool, and the remaining error of the poses.
-#: All parameters are then fitted for the corrections with the smallest remaining errors.
-#: This number is the maximum number of these fits.
+#: All parameters are fitted for at most this number of corrections from `_corrections`.
+#: These corrections have the smallest values of `_Trial.error_before`.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
@@ -114,8 +120,8 @@ class FitWithData:
     def reach(self) -> float:
         """Reach of the original model at the measured configurations, m.
 
-        The reach is the tip's largest distance from the base or a joint axis, and at most the sum of the
-        model's lengths.
+        The reach is the largest distance between the tip and the base, or between the tip and a joint axis.
+        The reach is at most `characteristic_length`.
         """
         chain = self.model.chain
         T, columns = chain.poses_and_jacobian(self.measurements.joint_values)
@@ -174,7 +180,7 @@ class FitWithData:
     def half_turn_zeros(self) -> list[str]:
         """Return the joints whose zero positions changed by about half a turn.
 
-        A wrong sign of the next joint can cause such a change.
+        The values of the next joint may then have the wrong sign.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"

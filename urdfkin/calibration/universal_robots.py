@@ -120,8 +120,8 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all joints turn about z, the origins are copied. For other URDFs, the joint origins are fitted. The
-    poses of `tool0` in `base` are then those of the calibrated arm.
+    If all joints turn about z, the joint origins are copied from the file. For other URDFs, the joint origins
+    are fitted. The poses of `tool0` in `base` are then those of the calibrated arm.
     """
     robot = as_robot(robot)
     origins = read_calibration(path, order)

@@ -46,13 +46,13 @@ from urdfkin.verify.oracle import QueryBatch
 
 #: Number of random configurations that the search tries first.
 RANDOM_SAMPLES = 512
-#: Number of random configurations with each variable at an end of its range.
+#: Number of random configurations at corners of the joint ranges.
+#: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
 #: Number of sampled configurations per frame at which the search starts.
 STARTING_POINTS = 4
-#: Number of values per coordinate in one step of the search.
+#: Number of values that one step of the search tries for one coordinate.
 VALUES_PER_STEP = 13
-#: Number of frames that are searched in one batch.
 FRAMES_PER_BATCH = 24
 #: Width of the search interval in each round, relative to the coordinate's range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
@@ -84,12 +84,12 @@ class DistanceSearch:
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame, for A's zero configuration.
         self.T_root_base = alignment.X @ alignment.b.zero_poses[alignment.base[1]]
-        #: Whether base link and root link are one rigid body, for A and B.
+        #: For A and for B: whether the base link and the root link belong to the same rigid body.
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether a joint between root and base link changes the distances.
-        #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
+        #: True if `as_written`, and a moving joint lies between A's or B's root and base link.
+        #: Then the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -260,16 +260,16 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return each frame's distances at its own configurations.
+        """Return the distances of frame k at the values `z[k]`.
 
         Args:
-            z: (frames, starting points, values, variables) different configurations for each frame.
+            z: (frames, starting points, values, variables) values of the variables.
             frames: Matching frames.
 
         Returns:
             (frames, starting points, values) distances, m.
         """
-        # NumPy rejects the size -1 for an empty array.
+        # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
@@ -312,7 +312,7 @@ BOXES_PER_BATCH = 2**16
 
 
 class BoxBounds:
-    """Upper bounds on a frame's distance in boxes of configurations.
+    """Compute an upper bound on a frame's distance for each box.
 
     Args:
         names: Every variable that changes the distance.
@@ -329,7 +329,7 @@ class BoxBounds:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: (nv, variables) derivatives of each robot's joint values.
+        #: For each robot, derivatives (nv, variables) of its joint values with respect to the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -410,8 +410,8 @@ def tighten(
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
-    # Unlimited revolute joints repeat their poses after one turn.
-    # Other unlimited ranges cannot be divided into boxes.
+    # An unlimited revolute joint repeats its poses after one turn.
+    # The unlimited range of any other joint cannot be divided into boxes.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)

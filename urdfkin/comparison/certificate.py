@@ -37,8 +37,7 @@ MAX_RECHECK_BOXES = 2**22
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
 #: Relative tolerance of a bound, in machine epsilons.
 _BOUND_TOLERANCE = 64.0
-#: Entries of a certificate that follow from the two models.
-#: `recheck` computes these entries again, and compares them.
+#: `recheck` computes these entries again, and compares the results with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -108,7 +107,7 @@ class CertifiedJoint(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """Two matching links with different poses on matching rigid bodies."""
+    """Two matching links that `same` reports as different tools."""
 
     a: Annotated[str, doc("Link of A.")]
     b: Annotated[str, doc("Link of B.")]
@@ -237,7 +236,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
 
 
 #: Attributes of `Sameness` that the certificate contains.
-#: Entries and attributes have the same names.
+#: The entries of the certificate have the names of the attributes.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",
@@ -256,8 +255,8 @@ def difference_text(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models.
 
-    The check uses the certificate's pairs of joints. For the verdict "differs", the pairs that `same` chooses
-    must also give "differs".
+    The check matches the joints as in the certificate. For the verdict "differs", `recheck` also matches the
+    joints as `same` does: the verdict must be the same.
 
     Returns:
         A line for each wrong statement.
@@ -394,7 +393,6 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return the first error in the base pose, conversions and orders of joints, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])

@@ -120,8 +120,8 @@ class Changes:
     Attributes:
         sources: Sources of the old and the new version.
         changes: The changes of the robot's name, then of joints, then of links.
-        effects: The effect of each joint whose changes move links, while all other joints are unchanged. A
-            joint whose effect cannot be computed, such as a new joint, has no entry.
+        effects: One entry for each joint whose changes move links. In this entry, all other joints are
+            unchanged. A joint whose effect cannot be computed, such as a new joint, has no entry.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
@@ -140,7 +140,7 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """The effects by element, for example "joint elbow"."""
+        """Map the name of each element, for example "joint elbow", to its effect."""
         return {effect.element: effect for effect in self.effects}
 
 

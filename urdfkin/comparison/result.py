@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 #: Values from 0.9 m or 0.9 rad have no unit prefix.
 #: Smaller values have the largest unit prefix that makes the number at least 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
-#: Both limits are slightly lower, because printed numbers are rounded.
+#: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -59,13 +59,13 @@ class Verdict(Enum):
 #: Kinds of changes. If such changes make B equal to A, the models are equivalent.
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
-#: Differences for which frame distances have an upper bound.
+#: Kinds of differences for which the distance between matching frames has an upper bound.
 BOUNDED_DIFFERENCES = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """A condition for the result of a comparison.
+    """A condition that `Sameness.holds` checks.
 
     Attributes:
         within: Largest allowed distance (m) and angle (rad) between matching frames of the unchanged models.
@@ -323,9 +323,8 @@ class Sameness(Displayable):
         remarks: Differences without effect on motion: joint limits, joint types, links of one model.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
-        tools: Matched links with different poses on the same rigid body. `same` reports the two links as
-            different tools.
-        orders: Groups of consecutive joints whose order differs. The order does not affect the motion.
+        tools: Matched links that `same` reports as different tools.
+        orders: Each entry lists consecutive joints of B in a new order, which does not affect the motion.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The identity if the roots
             coincide.
         base_links: A link of A and a link of B, on matching rigid bodies. The poses of A and B are compared
@@ -338,8 +337,8 @@ class Sameness(Displayable):
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
             link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`.
-        as_written: The interval with the largest distance between the unchanged models. None if `after` is
-            empty.
+        as_written: The interval of the frame that differs most between the unchanged models. None if `after`
+            is empty.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
             with equal names in A and B are compared.
@@ -415,7 +414,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval of the frame with the largest distance between the unchanged models.
+        """The interval of the frame that differs most between the unchanged models.
 
         A and B are compared at equal joint values.
 
@@ -442,9 +441,9 @@ class Sameness(Displayable):
     def within_single(self) -> bool:
         """Whether single precision can explain the displacement of every frame.
 
-        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. The
-        effect of a wrong number can be below this limit. Therefore, only `up_to_single` proves that rounding
-        is the cause. The result is False unless `verdict` is `Verdict.DIFFERS`.
+        The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
+        wrong number can also move frames by less than this limit. Therefore, only `up_to_single` proves that
+        rounding is the cause. The result is False unless `verdict` is `Verdict.DIFFERS`.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -491,7 +490,7 @@ class Sameness(Displayable):
         """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: Whether remarks and the verdict `Verdict.SAME_AFTER` also give 1.
+            strict: Whether to return 1 also for remarks and the verdict `Verdict.SAME_AFTER`.
             within: Largest allowed distance (m) and angle (rad) between frames of the unchanged models.
 
         >>> import urdfkin
@@ -504,8 +503,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert configurations (..., nq) of A to configurations (..., nq) of B.
 
-        Equivalent models have equal poses at both configurations, except for `base` and `tools`. Coordinates
-        that only B has are neutral.
+        If the models are equivalent, link poses at both configurations differ only by `base` and `tools`.
+        Coordinates that only B has are neutral.
 
         Raises:
             InputError: q does not have A's length.
@@ -538,8 +537,8 @@ class Sameness(Displayable):
         """Return a convention that converts A's coordinates to B's.
 
         The convention has the names, order, directions and zeros of B's joints. With this convention, A's
-        `robot.convention(...)` converts q, v, a and Jacobians. Equivalent models have equal poses at A's q
-        and B's q, except for `base` and `tools`.
+        `robot.convention(...)` converts q, v, a and Jacobians. If the models are equivalent, link poses at
+        A's q and B's q differ only by `base` and `tools`.
 
         Raises:
             InputError: a coordinate has no match in the other model, or the frames of a planar or floating
@@ -650,8 +649,8 @@ def changes_of_b(
 ) -> tuple[tuple[str, str], ...]:
     """Return the changes that make B equal to A.
 
-    The function stores the tool poses in `alignment`. With `tables`, every displaced frame counts as a tool,
-    because the frames of a Denavit-Hartenberg table depend on the table's convention.
+    The function stores the tool poses in `alignment`. With `tables`, every displaced frame is reported as a
+    tool. The frames of a Denavit-Hartenberg table depend on the table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -699,7 +698,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
-                continue  # The line about the base pose describes this difference.
+                continue  # The change "base" already describes this difference.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -709,7 +708,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return the matching links of the robots' mountings, such as a pedestal."""
+    """Return matching links of pedestals and other mountings."""
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -730,11 +729,11 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return two sets of links of the root body.
+    """Find links that support the robot, and links beside the robot.
 
     Returns:
-        Links with a fixed child that carries all moving joints, such as a pedestal. Links that carry no
-        moving joint, such as a table next to the robot.
+        Links of the root body with a fixed child that carries all moving joints, for example a pedestal.
+        Links of the root body that carry no moving joint, for example a table next to the robot.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -775,8 +774,8 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    # A mimic joint with the multiplier 0 may be a fixed joint here.
-    # The child link of such a joint is no tool.
+    # `same` can replace a mimic joint with the multiplier 0 by a fixed joint.
+    # The child link of this fixed joint is not treated as a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):
             return False
@@ -857,7 +856,7 @@ def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tup
     """Return tilt and shift beyond rounding.
 
     Returns:
-        Tilt, rad, and shift, m; 0 within rounding.
+        Tilt (rad) and shift (m). A value within rounding is replaced by 0.
     """
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
@@ -884,7 +883,7 @@ def remarks(
         for lock in filter(None, map(is_idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
-    # A mimic joint of A can be independent in B, although all joint values agree.
+    # A mimic joint of A can be an independent joint in B with the same motion.
     # For example, the mimic rule in B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]

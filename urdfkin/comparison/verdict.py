@@ -61,12 +61,12 @@ from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks distances.
 CONFIRMATION_SAMPLES = 8
-#: Maximum number of frames with a bound on the finer grid.
-#: The search for the largest distance between unchanged models uses at most this number of frames.
+#: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
+#: The search for the largest distance between the unchanged models uses at most this number of frames.
 MAX_FARTHEST_FRAMES = 4
-#: Maximum path length, m; squares of longer lengths overflow.
+#: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 MAX_PATH_LENGTH = 1e150
-#: Branch and bound ends at this ratio of upper bound to largest distance found.
+#: Branch and bound ends if the upper bound is at most this factor times the largest distance that was found.
 SHARP_FACTOR = 1.05
 
 
@@ -127,7 +127,7 @@ def same(
         within = as_finite_float(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         check_joint_names(robot.tree, list(names), which)
-    # `same` stores compiled trees in copies of the user's robots.
+    # The comparison stores compiled trees in the robots, so `same` passes copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -273,7 +273,7 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound the displacement of frames that single precision can cause.
+        """Bound how far single precision can displace frames.
 
         Returns:
             Distance, m, and angle, rad; None if no model has single precision.
@@ -317,8 +317,8 @@ class Comparator:
     def _comparable_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # Frames of a Denavit-Hartenberg table depend on its convention.
-        # Only links with equal names are therefore compared.
+        # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
+        # Therefore, a comparison with a table uses only links with equal names in A and B.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -338,7 +338,7 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the displacement of frames that rounding can cause.
+        """Bound how far rounding can displace frames.
 
         `same` ignores a small difference at each joint:
 
@@ -445,8 +445,8 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If all positions agree up to rounding, only one frame is searched:
-        # the frame with the largest bound on the angle.
+        # If all positions agree up to rounding, the search uses only one frame.
+        # This frame has the largest upper bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -564,10 +564,7 @@ def _fix_idle_joints(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Fix mimic joints with multiplier 0 at their offsets.
-
-    A joint is not fixed if the matching joint moves.
-    """
+    """Fix mimic joints with multiplier 0 at their offsets, unless the matching joint moves."""
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
     children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
@@ -645,9 +642,8 @@ def parse_joint_pairs(words: tuple[str, ...]) -> dict[str, str]:
 class JointComparison:
     """Prove joint by joint that single precision causes every difference.
 
-    The rounding errors of all joints together can move a frame farther than one wrong number. A comparison of
-    frame poses can miss this number. Therefore, each joint may differ only by the rounding of its own
-    numbers.
+    The rounding errors of all joints add up in a frame's pose. A comparison of frame poses can therefore miss
+    a small wrong number. For this reason, each joint may differ only by the rounding of its own numbers.
 
     **Compared quantities.** Two files can describe the same joint by different frames, and can have different
     fixed links. The compared quantities do not depend on these choices:
@@ -704,8 +700,8 @@ class JointComparison:
     - The path from P to the link has at most one moving joint.
     - In the second model, the joints from C to P have no rounded numbers.
 
-    **Limits of the proof.** A difference above its bound has another cause. An error below the rounding of a
-    joint's own numbers cannot be detected. The proof has three conditions:
+    **Limits of the proof.** A difference above its bound has another cause. A difference below its bound can
+    be rounding or a wrong number. The proof has three conditions:
 
     - In A and in B, the same moving joints lead from P to the link, in the same order.
     - A planar or floating joint is attached to the root body, and is the only joint from P to the link.
@@ -732,7 +728,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in alignment.frames}
         self.steps = {step.a: step for step in alignment.steps}
         root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
-        #: Links of A and B at which the paths begin.
+        #: The link of A and the link of B at which the compared paths begin.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -792,8 +788,8 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
-        # P and the link have a last common ancestor in B;
-        # `paths[1][0]` contains the joints from there to P.
+        # P and the link have a last common ancestor in B.
+        # The list `paths[1][0]` contains the joints from this ancestor to P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(
                 name, "", None, "the joints between this link and the nearest common link cannot be compared"
@@ -827,10 +823,10 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle and distance of two axes.
+        """Return the angle and the distance between two axes.
 
-        The distance is measured from the joint's origin on one axis to the other axis. For a prismatic joint,
-        the distance is 0.
+        The distance is that of one joint's origin from the other joint's axis. For a prismatic joint, the
+        distance is 0.
 
         Returns:
             Angle, rad, and distance, m.
@@ -870,10 +866,7 @@ class JointComparison:
         return screws, T_P_common @ T, errors_in_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
-        """Return the error bounds after a joint.
-
-        `errors` contains the bounds (m, rad) before the joint.
-        """
+        """Return (W + E |p_i| + w_i, E + e_i) in m and rad; `errors` is (W, E)."""
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
         return np.array([errors[0] + errors[1] * lever + metres, errors[1] + radians])
