@@ -1,4 +1,4 @@
-"""Conventions as data: the built-in conventions, and a user's own convention from a TOML file.
+"""Built-in conventions, and conventions from a user's TOML file.
 
 The target program can be any other program or library for robots. A user's file may start from a built-in
 convention and change some of its joints:
@@ -156,7 +156,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse a convention's TOML text.
 
-    `name` is the convention's name if the text contains none.
+    `name` is the default name and title.
     """
     try:
         entries = tomllib.loads(text)
@@ -267,9 +267,10 @@ def _quote(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: The value of a character in an encoded number is its index in `_DIGITS`, from 0 to 61.
-#: The value of a number's last character is below `_THRESHOLD`.
-#: The values of all other characters are at least `_THRESHOLD`.
+#: An encoded number is a sequence of characters of `_DIGITS`.
+#: The value of a character is its index in `_DIGITS`, from 0 to 61.
+#: The last character of a number has a value below `_THRESHOLD`.
+#: All other characters of the number have values of at least `_THRESHOLD`.
 _THRESHOLD = 31
 
 

@@ -32,10 +32,10 @@ _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """A number of the target program's q or v.
+    """One coordinate or one joint velocity of the target program.
 
-    The number is y = factor * x[index] + zero, where x is urdfkin's q or v.
-    If `part` is "cos" or "sin", the number is cos(y) or sin(y).
+    The value is y = factor * x[index] + zero, where x is urdfkin's q or v.
+    If `part` is "cos" or "sin", the value is cos(y) or sin(y).
     """
 
     name: str
@@ -49,13 +49,13 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint whose velocity the target program defines differently.
+    """A planar or floating joint with a block in `Conversion.matrix`.
 
     Attributes:
         q: First index in urdfkin's q.
         v: First index in urdfkin's v.
         rows: Indices in the target program's v.
-        point: (3,) point of the target program's linear velocity, in the joint's frame (m).
+        point: (3,) the link's origin or centre of mass, in the joint's frame (m).
     """
 
     joint: Joint
@@ -70,7 +70,7 @@ class Conversion:
 
     Args:
         tree: The robot.
-        urdf: The URDF text, the source of some joint orders and centres of mass.
+        urdf: The robot's URDF text.
         convention: The convention.
         joints: Order of the joints, instead of the convention's; required if the convention has none.
 
@@ -319,7 +319,7 @@ class Conversion:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Name of each number of the target program's q."""
+        """Names of the coordinates in the target program's q."""
         return tuple(column.name for column in self._columns)
 
     @property
@@ -580,7 +580,7 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 with v = M^-1 v_tool.
 
-        The columns of redundant numbers of v_tool, such as velocities of mimic joints, are 0.
+        The column of a mimic joint is 0 if v_tool contains the mimicked joint.
 
         Returns:
             (..., nv, program's nv) matrix.
@@ -783,7 +783,7 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the conversion of "q" or "v" between two conventions as a reordering.
+    """Find a `Reordering` that converts "q" or "v" between two conventions.
 
     A reordering cannot convert angles to cosines, or change a velocity's frame.
 
@@ -825,9 +825,9 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each number of urdfkin's q or v, find a number of the target program that determines it.
+    """Return indices k for which x_tool[..., k] has the order of urdfkin's q or v.
 
-    Numbers of mimic joints have the lowest priority.
+    A mimic joint is used only if the target program has no coordinate of the mimicked joint.
     """
     return [
         min(

@@ -6,8 +6,8 @@ equal labels. By default, a link's label is the link's name. Third, the remainin
 paired by geometry, the most similar joints first.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. With the same zero offsets, links with equal labels must coincide. The multipliers of the
-mimic rules must also correspond; the method `SubtreeMatcher.ignore_rules` removes this condition.
+the other subtree. With these zero offsets, links with equal labels must also coincide. The multipliers
+of the mimic rules must correspond; the method `SubtreeMatcher.ignore_rules` removes this condition.
 
 The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
 value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
@@ -263,10 +263,10 @@ class Axis:
         return Axis(self.screw.transform(T), self.turns, self.reference.transform(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return where the reference line is nearest to the axis.
+        """Find the point of the reference line that is nearest to the axis.
 
         Returns:
-            Coordinate along u (m); None for prismatic joints and parallel lines.
+            The point's coordinate along u (m); None for prismatic joints and parallel lines.
         """
         s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
@@ -306,7 +306,7 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of later joint axes of the same kind.
 
-    The search continues outwards only after an axis of A that is parallel to A's reference line.
+    A branch ends at the first axis of A that is not parallel to A's reference line.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -399,8 +399,8 @@ def _first_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A and each branch of B, return the first pair of revolute axes.
 
-    Each item also contains the prismatic pairs before this pair, and the pairs after it.
-    Without a revolute pair, the item contains the last prismatic pair instead.
+    Each item is (pair, prismatic pairs before the pair, pairs from `later_axes`).
+    Without a revolute pair, `pair` is the last prismatic pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -443,7 +443,7 @@ ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatA
 #: Maximum number of joint pairs that the exact search tries for each pair of bodies.
 MOST_ASSIGNMENTS = 5000
 
-#: For each coordinate of A: matching coordinate of B, and velocity ratio B / A.
+#: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
 
 
@@ -453,7 +453,6 @@ class _Match:
 
     Attributes:
         X: (4, 4) pose of B's body after the two joints.
-        ratios: Velocity ratios of the coordinates of both subtrees.
     """
 
     X: FloatArray

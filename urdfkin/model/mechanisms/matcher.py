@@ -58,13 +58,14 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
-#: Maximum number of later joints on a branch that decide between equally good choices.
+#: If several choices are equally good, the matcher compares later joints.
+#: This is the maximum number of later joints on a branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses from joint axes that the exact search tries for a pair of bodies.
+#: Maximum number of poses of B's root that `_exact_root_poses` computes from axes.
 MOST_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
-#: For equal numbers, a score is better if its largest difference (m) is
-#: smaller than this factor times the largest difference of the other score.
+#: For equal numbers, a score with a much smaller difference (m) is better.
+#: The smaller difference must be less than this factor times the larger difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or the motion N of a planar or floating joint.
@@ -90,13 +91,11 @@ class LookAhead:
 class BodyPair:
     """A body of A and the corresponding body of B.
 
-    Both motions start at the zero configuration of the moved body.
-
     Attributes:
         via: The joints of A and of B before the bodies; None at the first bodies.
         previous: Index of the previous joint pair, or -1.
-        G: (4, 4) motion of A's body to the current pose of B's body.
-        XC: (4, 4) motion of B's body to its current pose.
+        G: (4, 4) motion of A's body; a link of A is compared at G @ zero_pose.
+        XC: (4, 4) motion of B's body; a link of B is compared at XC @ zero_pose.
     """
 
     bodies: tuple[int, int]
@@ -110,7 +109,8 @@ class MechanismMatcher:
     """Match the joints of two mechanisms.
 
     Without `choices`, the matcher searches for B's root pose, signs, zero offsets and conversions.
-    `base` contains the indices of the first links; None if the matcher chooses the first bodies.
+    `base` contains the indices of the links of A and B where the search starts.
+    If `base` is None, the matcher chooses these links.
     """
 
     def __init__(
@@ -316,10 +316,7 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair two links as different end-effector frames.
-
-        The labels of these links occur in one model only.
-        """
+        """Pair two links whose labels occur in one model only."""
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -488,7 +485,7 @@ class MechanismMatcher:
             offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
-        # Either K displaces the axis and all later bodies of B, or only the axis.
+        # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
         with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
@@ -508,7 +505,7 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _zero_choice(self, joint: str) -> tuple[int, float | None]:
-        """Return a joint's prescribed sign and zero offset.
+        """Return a joint's sign and zero offset from `choices`.
 
         Without `choices`, the result is (0, None).
         """
@@ -735,7 +732,6 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
     """Search again with larger tolerances.
 
     If all axes differ slightly, no axes agree within the normal tolerance.
-    The choices of this search are applied with the normal tolerance.
     """
     a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
     size = size_of(a, b)
@@ -768,7 +764,7 @@ def _best_alignment(
     ).find_best()
 
 
-#: Numbers of full turns that are added to a revolute joint's zero offset on trial.
+#: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, as a multiple of the angle tolerance.
 #: A zero offset is computed from the axes of two joints.

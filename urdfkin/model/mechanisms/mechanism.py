@@ -36,8 +36,8 @@ after such joints depend only on the sum of the two angles.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
-determine this function. If a joint can move independently only in B, the joint's coordinate is an additional
-variable. For example, the joint is a mimic joint or a fixed joint in A.
+determine this function. Some coordinates of B are additional variables. For example, if A's joint is fixed
+and B's joint moves, the coordinate of B's joint is an additional variable.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def planar_angle(P: FloatArray) -> FloatArray:
-    """Return the angle (rad) of the nearest rotation about z."""
+    """Return the angle (rad) of the rotation about z that is nearest to P."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
@@ -349,7 +349,7 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield equivalent joint orders for each unbranched run.
+        """Yield the joint orders with the same motion, for each run of consecutive joints.
 
         The current order comes first.
         """
@@ -414,7 +414,7 @@ class Mechanism:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """The largest angle (rad) and distance (m) that rounding can cause."""
+    """Limits for an angle (rad) and a distance (m)."""
 
     angle: float
     distance: float
@@ -472,14 +472,17 @@ class MatchedJoints:
         sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
         before: Rigid motion L (4, 4) before B's joint.
-        axis_a: Screw S; exp(S t) moves the body farther from the base.
+        axis_a: Screw S; exp(S t) moves the bodies after the joint.
             If A's joint is fixed, `axis_a` is the screw of B's joint.
         axis_b: Screw S'. If S' = S, `axis_b` is the same object as `axis_a`.
         tilt: Angle between axes, or between normals of planar joints, rad.
         shift: Distance between axes, or between origins of planar or floating joints, m.
-        kind_difference: "a" if only A's joint is fixed, and "b" if only B's joint is fixed.
-            "kind" for moving joints of different kinds, and for planar or floating joints
-            that one model reverses, without `conversion`. Otherwise "".
+        kind_difference:
+            "a":     only A's joint is fixed
+            "b":     only B's joint is fixed
+            "kind":  both joints move, and their kinds differ
+            "kind":  one model reverses a planar or floating joint, and `conversion` is None
+            "":      all other joints
         conversion: Conversion of a planar or floating joint with different coordinates, else None.
     """
 
@@ -607,7 +610,8 @@ class Alignment:
     def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield two joint pairs whose partners can be exchanged.
 
-        Both pairs have the same kind and the same previous pair, and lie on paths to differences.
+        Both pairs have the same kind and the same previous pair.
+        Each joint pair differs, or a later joint pair or link pair differs.
         The names of A's two joints occur neither in B nor in `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
@@ -630,7 +634,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # Two matched links give the transform from B's body to A's.
+            # A matched pair of links on these bodies gives the transform from B's body to A's body.
             T_a_b = known.end @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
@@ -662,7 +666,8 @@ class AlignmentChoices:
     """Prescribed values for an alignment.
 
     Attributes:
-        base: Names of the first links of A and B; None if the search chooses the first bodies.
+        base: Names of the links of A and B where the search starts.
+            None if the search chooses these links.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: Sign and zero offset (rad or m), by A's joint name. The default is (1, 0).
         conversions: Conversions of planar and floating joints, by A's joint name.
@@ -676,7 +681,7 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: Choices with equal root poses and equal joint coordinates.
+#: A and B have equal root poses, and equal coordinates for each joint.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -834,8 +839,10 @@ class _VariablesBuilder:
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two functions differ by rounding only.
 
-        Slopes may differ by the error of one joint. Constants may differ by the sum of the
-        errors on the longest path. Constants depend on zero offsets, which are computed from poses.
+        Allowed differences, with the rounding error e of one joint:
+
+            slopes:      e
+            constants:   depth * e, because zero offsets are computed from poses
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._joint_rounding(a)

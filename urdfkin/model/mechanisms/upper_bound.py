@@ -13,8 +13,8 @@ urdfkin computes h joint by joint along the chain, without a search over joint v
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
 angle of a range, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon
-is at one of its corners. At each joint, the interpolation increases the bound. The relative increase is
-proportional to the square of the distance between grid points.
+is at one of its corners. At each joint, the interpolated h can be larger than the true h. The relative
+difference is proportional to the square of the distance between grid points.
 
 **Recursion.** At joint i:
 
@@ -30,8 +30,8 @@ proportional to the square of the distance between grid points.
 
 urdfkin computes the maxima from the support functions of y and d. If A and B differ at several joints, the
 terms of these joints may be largest in different configurations. The sum of the maxima then exceeds the true
-maximum. If A and B differ only in constant motions L, urdfkin computes a second bound, and uses the smaller
-bound. The second bound is the sum of upper bounds on the displacements by the motions L.
+maximum. A second bound is the sum of upper bounds on the displacements by the motions L. The second bound
+holds if the joints of A and B have equal axes and equal values. The result is the smaller bound.
 
 **Second derivatives.** The function `curvature` computes bounds joint by joint, from the frame to the base.
 
@@ -164,11 +164,13 @@ class Support:
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return h after each rotation of the set of points.
 
+            result:             h(along + factor R^T across)
+            along + across:     a grid point's parts along and perpendicular to the axis
+
         Args:
             axis: Unit vector.
             angles: (k,) angles, rad.
-            factors: Multiplier for each angle or for all angles. A multiplier scales the part of
-                each grid point that is perpendicular to the axis.
+            factors: (k,) factors, or one factor for all angles.
 
         Returns:
             (k, n) values at the grid points.
@@ -241,7 +243,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 #: `FINE_GRID` gives smaller bounds than `COARSE_GRID`, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
 #: Maximum number of sample values of a revolute joint's variable.
-#: If a range needs more samples, the angles in A and B count as independent.
+#: If a range needs more samples, `_independent_difference` computes the bound.
 MOST_VALUES = 1024
 
 
@@ -417,7 +419,8 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
     """Return samples of the variable that moves two matched revolute joints.
 
     Returns:
-        (n,) samples; None if the angles must be treated as independent.
+        (n,) samples. None for two variables, for too many samples, or for an infinite range
+        with a slope other than 0, 1 and -1.
     """
     if (name := pair.variable) is None:
         return None
@@ -486,7 +489,7 @@ def _common_difference(
 def _independent_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
 ) -> Support:
-    """Return the support function of the change of d by a revolute joint with independent angles.
+    """Return the support function of e(S' t') y - e(S t) y for independent angles t and t'.
 
     Definitions and bounds:
 
@@ -494,8 +497,7 @@ def _independent_difference(
                           a:  largest difference of the angles, at most pi
                           distance <= chord 2 r sin(a/2)
 
-        different axes:   change = e(S' t') y - e(S t) y
-                          h = (h of e(S' t') y) + (h of -e(S t) y)
+        different axes:   h = (h of e(S' t') y) + (h of -e(S t) y)
     """
     G, u = y.grid.points, step.axis_a.direction
     if step.axis_b is not step.axis_a:
@@ -518,7 +520,8 @@ def curvature(
 ) -> tuple[list[str], FloatArray]:
     """Return upper bounds on the second derivatives of D with respect to the variables.
 
-    All bounds are inf if a joint pair with an effect on D has different variables or slopes.
+    All bounds are inf if paired joints have different variables or slopes.
+    Pairs without effect on D are ignored.
 
     Returns:
         n names of variables, and (n, n) bounds (m).
@@ -530,7 +533,7 @@ def curvature(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For a prismatic joint i, `bound` can be 0 although its values in A and B differ.
+        # For a prismatic joint i, `bound` can be 0 although the joint values in A and B differ.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:
@@ -615,7 +618,10 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a joint pair without translations, which do not affect free vectors."""
+    """Return a copy of a joint pair without translations.
+
+    Translations do not change free vectors.
+    """
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
