@@ -50,7 +50,8 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
-#: Time limit of axe-core, s; 100,000 elements take half a minute.
+#: Time limit of axe-core, in seconds.
+#: A page of 100,000 elements takes half a minute.
 _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")
@@ -59,7 +60,7 @@ UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = t
 #: Maximum number of PDF pages that are converted to pictures.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Without a mouse, the site's theme hides some elements.
+#: The site's theme hides some elements if Chromium reports no mouse.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -72,12 +73,12 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: JavaScript: name, width and available width of too wide tables.
+#: JavaScript that returns name, width and available width of each table that is wider than its box.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: JavaScript: the focused element, and whether its focus is visible.
+#: JavaScript that describes the element with the focus, and whether an outline or shadow marks it.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -87,7 +88,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript: whether losing the focus changes the element's border.
+#: JavaScript that returns whether the border of the focused element changes when it loses the focus.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -218,7 +219,7 @@ def run_viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def open_page(browser: Browser, page: Page) -> None:
-    # Chromium does not reload if the address changes only after `#`.
+    # Chromium does not reload a page if the new address differs only in the part after `#`.
     browser.chrome.get("about:blank")
     browser.chrome.get(page.url)
     if page.ready:
@@ -272,7 +273,7 @@ def check_keyboard(browser: Browser, page: Page) -> list[str]:
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
-        if stop is None:  # The Tab key left the page.
+        if stop is None:  # The Tab key moved the focus out of the page.
             break
         element, is_marked, has_area, has_name = stop
         seen.append(element)
@@ -344,7 +345,7 @@ def main() -> None:
         return name.startswith(tuple(arguments.only))
 
     def audit_page(browser: Browser, page: Page) -> None:
-        # The site stores the theme of the first visit.
+        # The site stores the theme of the first visit, so the stored theme is removed before each page.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         page_faults = audit(browser, page, arguments.output, axe, jar)

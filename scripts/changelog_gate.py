@@ -53,8 +53,11 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
     except NoBaseError as error:
         print(f"changelog not checked: {error}")
         return 0
-    # Entry of a changed file: added TAB deleted TAB path NUL.
-    # Entry of a moved file: added TAB deleted TAB NUL old path NUL new path NUL.
+    # git prints an entry for each changed file:
+    # added lines TAB deleted lines TAB path NUL.
+    # If a file was moved, the entry is:
+    # added lines TAB deleted lines TAB
+    # NUL old path NUL new path NUL.
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
     changed = {path for added, deleted, path in changes if (added, deleted) != ("0", "0")}
     package = sorted(path for path in changed if path.startswith("urdfkin/"))

@@ -44,7 +44,7 @@ from urdfkin.verify.verifier import compute_bound
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Maximum numbers of stored configurations and frames.
+#: Maximum numbers of stored configurations and frames for each robot.
 STORED, STORED_FRAMES = 9, 6
 #: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED_INDEX = 3

@@ -51,7 +51,7 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: Maximum nv for a Hessian in a PyTorch or JAX file.
+#: If a robot has more joint velocities than this number, a PyTorch or JAX file contains no Hessian.
 #: The check of a larger Hessian is slow.
 #: An `array` file for JAX has no Hessian: JAX would compile the Hessian for minutes.
 _MAX_HESSIAN = 16

@@ -78,6 +78,7 @@ class Job:
 
 Poses = list[FloatArray]
 #: Function that returns the poses of all jobs.
+#: The function may write files into the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -136,7 +137,8 @@ def run_in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     if process.stdout.startswith("missing"):
         raise MissingProgramError("Octave's package symbolic")
-    # Octave's package prints the Python version, which `re.sub` removes.
+    # Octave's package also prints the version of Python that it found.
+    # `re.sub` removes the printed version.
     parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in process.stdout.split("end\n")[:-1])
     return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
@@ -164,7 +166,8 @@ def load_as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 RUN: dict[str, Run] = {
     **{form: partial(run_in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": run_in_c,
-    # Substitutes replace the toolbox's classes; MATLAB was not run.
+    # Octave uses substitutes for the toolbox's classes.
+    # `matlab-rst` has not been run in MATLAB.
     **{form: partial(run_in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
     **{form: partial(read_written_table, form) for form in ("toml", "json", "csv")},
     "urdf": load_as_urdf,
@@ -218,7 +221,8 @@ class Case:
             Largest difference from urdfkin's pose, divided by the bound.
         """
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # Sine and cosine are rounded even if all lengths are zero.
+        # Sine and cosine have rounding errors.
+        # The bound is therefore not zero, even if all lengths are zero.
         allowed = 2.0 * np.maximum(
             self.table.rounding(self.job.q), EPS * table_roundings(len(self.table.rows))
         )

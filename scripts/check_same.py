@@ -37,7 +37,8 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of a placement element (m, or matrix entry).
+#: Maximum rounding error of each element of a placement.
+#: Elements are coordinates (m) and entries of the rotation matrix.
 ROUNDING = 1e-10
 
 

@@ -86,11 +86,11 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: GitHub's markup of an image with light and dark versions.
+#: Regular expression for GitHub's markup of an image with a light and a dark version.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )
-#: Sine or cosine before a variable, for example `cos q`.
+#: MathML of a sine or cosine without brackets, for example `cos q`.
 _NAME_OF_FUNCTION = re.compile(r"(<mi>(?:cos|sin)</mi>)(?=<m(?:i|sub)>)")
 _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 

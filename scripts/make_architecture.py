@@ -22,7 +22,7 @@ ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
 PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
-#: Modules or packages that may import each foreign library.
+#: For each foreign library: the module or the packages that may import it.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
@@ -85,6 +85,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in imported_names_by_module().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
+        # An imported name is a module, or is defined in a module.
         # For example, `urdfkin.robot.loading` is a module, and `urdfkin.robot.Robot` is a class.
         ours = [
             name if name in modules() and last not in _reexported(head) else head

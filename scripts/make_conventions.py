@@ -59,7 +59,9 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: Joints z and a at the base, and joint k after z.
+#: A robot that shows the order of coordinates.
+#: Joints z and a are at the base.
+#: Joint k comes after joint z.
 TREE = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -113,7 +115,7 @@ def find_definition(found: FloatArray, readings: Readings) -> str:
     return named[0]
 
 
-#: A convention, and the answers of urdfkin, Pinocchio and MuJoCo.
+#: A row of the table: a convention, and the answers of urdfkin, Pinocchio and MuJoCo.
 Row = tuple[str, str, str, str]
 
 
@@ -210,7 +212,7 @@ def _motion_rows(measured: MeasuredMotion) -> Iterator[Row]:
             find_definition(theirs, readings),
             mujocos,
         )
-    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: `jacp`, then `jacr`
+    columns = np.zeros((6, 3))  # MuJoCo's Jacobian of the body's origin: rows `jacp`, then rows `jacr`
     position = measured.mj_data.xpos[measured.body]
     mujoco.mj_jac(measured.mj_model, measured.mj_data, columns[:3], columns[3:], position, measured.body)
     yield (

@@ -54,7 +54,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: Warnings of catalogue robots, each with an explanation.
+#: Codes of the warnings that catalogue robots cause, each with an explanation.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -66,7 +66,8 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: Options of `urdfkin check` that limit sizes, with default and unit.
+#: Options of `urdfkin check` that limit the size of the input.
+#: Each option has a default limit and a unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
@@ -125,7 +126,7 @@ def make_reports_parts() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # Without a description, an entry gets the description of its type.
+            # If an entry has no description, the page shows the description of the entry's data type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append(
                 (f"`{name}`", _format_type(entry), _escape(entry.get("description") or kind["description"]))
@@ -164,7 +165,8 @@ STUDIED_ROBOTS = {
     "polar": "polar robot of the textbook",
 }
 MOVING_BASE_ROBOTS = ("talos", "anymal", "ur5")
-#: Samples per robot in the accuracy study and for enclosures.
+#: Numbers of samples per robot:
+#: in the accuracy study, and in the table of enclosures.
 SAMPLES, ENCLOSURE_SAMPLES = 10, 5
 
 
@@ -234,13 +236,14 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # `steps`: largest interval width, in distances of neighbouring doubles
-            # at the quantity's largest absolute value.
+            # `steps` is the largest width of an interval.
+            # The unit is the distance between neighbouring doubles
+            # at the largest absolute value of the quantity.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Exact results have intervals of width 0.
+            # Exact results have intervals of width 0 and are not counted.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")

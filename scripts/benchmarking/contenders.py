@@ -38,7 +38,7 @@ class Contender:
     module: str
     calls: Callable[[Workload, str], Iterator[Calls]] | None = None
     #: Function that yields the timed tasks for batches.
-    #: None: the benchmark calls the library in a loop.
+    #: If None, the benchmark calls the library once for each configuration.
     batches: Callable[[Workload, str], Iterator[TimedTask]] | None = None
     program: str | None = None  # The library needs this program.
 
@@ -339,9 +339,10 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     yield Calls(label, names, lines, order=order, remark=remark)
 
 
-#: Larger calls of PyTorch Kinematics are slower per configuration.
+#: In larger calls, PyTorch Kinematics takes more time per configuration.
 _MAX_BATCH = 20_000
-#: PyTorch Kinematics reads angles in single precision.
+#: Tolerance for PyTorch Kinematics.
+#: PyTorch Kinematics reads the angles of a URDF in single precision.
 _SINGLE_TOLERANCE = 1e-6
 
 

@@ -21,9 +21,12 @@ from urdfkin.compiled.preload import use_only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Times until the first result, ms: with an empty kernel cache, and with all kernels in the cache.
+#: Names of two times (ms) until a process has its first result.
+#: In the first case, the kernel cache is empty.
+#: In the second case, the kernel cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
-#: Methods of `Robot` that compile a kernel, with their inputs:
+#: Methods of `Robot` whose first call compiles a kernel.
+#: Each method has a number of inputs:
 #: 1: q; 2: q and v; 3: q, v and a.
 USES = {
     "placement": 1,

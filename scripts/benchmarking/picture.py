@@ -25,7 +25,7 @@ Entry = Mapping[str, Any]
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
-        figure = new_figure(11.0, 12.0)  # The longest name fits into this width.
+        figure = new_figure(11.0, 12.0)  # The longest name of a contender fits into this width.
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])

@@ -154,8 +154,12 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure_rows(table, tasks, rounds, tasks[1])
 
 
-# Steps of a batch, for example the forward recursion:
-# the time of step k is the time of the first k steps, minus the time of the first k - 1 steps.
+# A batch has several steps, for example the forward recursion.
+# For each k, the benchmark measures a kernel for k steps.
+# The time of step k is the time for k steps, minus the time for k - 1 steps.
+# For one configuration, the benchmark measures seven lines of Python (`_calls`).
+# Most of these lines omit some steps.
+# Differences between the times of the lines give the step times.
 
 #: Instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -255,7 +259,7 @@ def _calls(workload: Workload, quantity: str) -> Iterator[Calls]:
         "out": np.empty(workload.result_shape(quantity)),
     }
     for line in (
-        "q",  # No function call: the time of the loop alone.
+        "q",  # This line calls no function, so the measured time is the time of the loop.
         f"function({q_v_a}, out=out)",
         f"compute({q_v_a}, shape)",  # `compute` rejects a tuple as `out`.
         "empty(shape)",

@@ -17,8 +17,8 @@ Entry = Mapping[str, Any]
 _SHARE = "speed relative to generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: Sections with several numbers of joints, frames or configurations:
-#: title of the table, and function that returns a row's cells.
+#: Sections with measurements for several numbers of joints, frames or configurations.
+#: Each value contains the title of the section's table, and a function that returns the cells of a row.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",

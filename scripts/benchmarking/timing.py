@@ -17,7 +17,8 @@ import numpy as np
 from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference between contenders, much larger than rounding.
+#: Maximum allowed difference between contenders (m, rad, m/s^2, rad/s^2).
+#: The allowed difference is much larger than rounding errors.
 TOLERANCE = 1e-9
 
 
@@ -58,7 +59,7 @@ class Row:
     n: int = 0
     median_ns: float = 0.0
     minimum_ns: float = 0.0
-    #: Median time of the baseline / median time of the contender.
+    #: Median time of the baseline, divided by the median time of the contender.
     ratio: float | None = None
     remark: str = ""
 
@@ -139,7 +140,7 @@ class Calls:
     """
 
     label: str
-    #: Variables of the lines, besides `q`, `v` and `a`.
+    #: Variables of the lines, by name. The lines can also use the variables `q`, `v` and `a`.
     names: Mapping[str, Any]
     #: Lines that compute one result.
     #: The value of the last line is the result.
@@ -148,7 +149,7 @@ class Calls:
     #: None: the value of the last line in `lines` is written into `out[k]`.
     store: tuple[str, ...] | None = None
     #: `order[i]` is urdfkin's index of the library's coordinate i.
-    #: None: urdfkin's order of coordinates.
+    #: None: the library and urdfkin have the same order of coordinates.
     order: list[int] | None = None
     #: Shape of the library's result for one configuration.
     #: None: the shape of urdfkin's result.

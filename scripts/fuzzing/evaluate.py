@@ -32,10 +32,10 @@ _SIZES = {"URDF526", "URDF603", "URDF606"}
 #: Maximum number of frames in one call.
 FRAMES_PER_CALL = 12
 #: Calls for several frames are compared with calls for single frames.
-#: Maximum number of single frames.
+#: Maximum number of calls for single frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
-#: Distance of the far base from the origin, m.
+#: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
 #: Quantities that one call computes for several frames.
 #: The value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
@@ -218,7 +218,7 @@ def _placements_by_name(
     for i in generator.permutation(len(prefixed_names))[:TESTED_NAMES]:
         try:
             yield f"placement of {prefixed_names[i]!r}", robot.placement(q, prefixed_names[i])
-        except UnknownNameError:  # For example, `joint:x` is unknown without a joint x.
+        except UnknownNameError:  # For example, `joint:x` is unknown if the robot has no joint x.
             if prefixed_names[i] in names:
                 raise
         except InputError:  # Two frames have this name.

@@ -19,11 +19,11 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Relative tolerance of placements against MuJoCo.
+#: Relative tolerance of urdfkin's placements, compared with MuJoCo's placements.
 #: Equality constraints have 1000 times this tolerance.
 _TOLERANCE = 1e-12
 
-# MuJoCo must not write a log into the current folder.
+# Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 

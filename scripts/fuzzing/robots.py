@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 from scripts.fuzzing import Case
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: "everything" combines several kinds of unusual content.
+#: Robots of the family "everything" have several random kinds of unusual content.
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
@@ -33,7 +33,7 @@ _WEIGHTS = (5, 4, 4, 3, 1, 1)
 _ONE_COORDINATE = KINDS[:3]
 
 #: XML elements that other programs add to URDF files. A namespace prefix replaces `{p}`.
-#: Readers must ignore links, joints and mimic rules in these elements.
+#: A URDF reader must not read links, joints or mimic rules from these elements.
 _FOREIGN = (
     '<{p}:joint name="j0" type="fixed"><parent link="l0"/><child link="l1"/></{p}:joint>',
     '<{p}:link name="l0"/>',
@@ -205,7 +205,7 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Chains accumulate the largest rounding errors.
+        # Most random robots are chains, because a chain accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
@@ -264,7 +264,7 @@ class _RandomRobot:
         rng = self.rng
         if "mimic" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
-        # A mimic joint mimics only joints with lower numbers.
+        # A mimic joint mimics only a joint with a lower number, so there is no cycle.
         independent_joints = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not independent_joints:
             return ""

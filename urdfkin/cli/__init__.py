@@ -23,8 +23,7 @@ from urdfkin.verify.quantities import quantities_by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Commands below each heading of the help page,
-#: each with its module in `urdfkin.cli` and its summary.
+#: Commands below each heading of the help page, each with its module in `urdfkin.cli` and its summary.
 #: A command is the function `NAME_command` of its module. `make_command` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {

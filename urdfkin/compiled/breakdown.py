@@ -46,7 +46,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Kinds of acceleration of a joint, in the order of `AccelerationBreakdown.terms`.
+#: Kinds of acceleration that a joint contributes, in the order of `AccelerationBreakdown.terms`.
 ACCELERATION_KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 _MAX_DISPLAYED = 2
 

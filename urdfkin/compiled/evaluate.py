@@ -51,11 +51,11 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INPUT_ARGS = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Smallest size of results that are written directly to memory, bytes.
+#: Smallest size (bytes) of results that are written directly to memory.
 #: Such results do not fit into the caches.
 _MIN_BUFFERED_BYTES = 2 << 20
 #: Maximum number of doubles in the buffer of results.
-#: 24 KiB, half of a first-level cache of 48 KiB.
+#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_BUFFER_SIZE = 3072
 
 _STRIDE_ARGS = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -162,7 +162,7 @@ def _compute(
 ) -> FloatArray:
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    # With the stride 0, all rows are one row of memory.
+    # In an array with the stride 0, all rows are the same row of memory.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (invalid := _compute_interpreted(name, program, reference, inputs, out, threads)) is None:
         invalid = _compute_compiled(
@@ -200,7 +200,7 @@ def _compute_interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.add_time(name, took)
-        # The first configuration takes longer than the others.
+        # The first configuration takes longer than later configurations, so its time is not representative.
         if i and (left := len(flat) - 1 - i) and preload.get_kernel(name, left * least) is not None:
             return None
     return invalid
@@ -288,11 +288,12 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Smallest batch for several threads.
+#: Minimum size of a batch that uses several threads.
 #: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 
-#: Number of configurations per part; intermediate results fit into the cache.
+#: Number of configurations that NumPy computes at a time.
+#: Their intermediate results fit into the cache.
 ROWS_PER_PART = 2048
 
 #: A function that computes rows of `out` from rows of `inputs`.

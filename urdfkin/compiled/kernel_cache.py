@@ -25,7 +25,7 @@ from urdfkin.system.locks import import_lock, make_fork_safe_lock
 #: `logging`'s lock must therefore be created before this lock.
 compile_lock = make_fork_safe_lock()
 
-#: A function that receives the name of a kernel and the compile time, s.
+#: A function that receives a kernel's name and compile time (s).
 #: When the compilation begins, the second argument is None.
 Listener = Callable[[str, float | None], None]
 

@@ -24,8 +24,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(ProgramHeader.FRAMES), int(ProgramHeader.NV)
 
-#: `_POSE_ROWS`: scratch rows of the 16 elements of a pose.
-#: `_SIX_ROWS`: scratch rows of the six numbers of a velocity or acceleration.
+#: `_POSE_ROWS` are the scratch rows with the 16 elements of a pose.
+#: `_SIX_ROWS` are the scratch rows with the six numbers of a velocity or an acceleration.
 _POSE_ROWS = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX_ROWS = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -74,7 +74,7 @@ def _store_pose_row(s, row, x, last):
 def write_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
     if reference == _WORLD:
-        # Velocity of the body point that is now at the world's origin.
+        # The result is the velocity of the body point that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_zero_vector(), p))
     _write_six_vector(m, s, program, place, b, vel, w, to)
 

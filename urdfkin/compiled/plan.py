@@ -336,27 +336,30 @@ class ProgramHeader(IntEnum):
     BASE = 12
 
 
-#: Number of doubles in a scratch row, one per configuration.
+#: Number of doubles in a row of scratch memory.
+#: A row has a double for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Integers per instruction: operation, three operands, index of its constants.
+#: Number of integers in an instruction:
+#: the operation, three operands, and the index of the constants.
 INSTRUCTION_WIDTH = 5
-#: Integers per joint angle:
+#: Number of integers that describe a joint angle in a program:
 #: 0: scratch row of the angle,
 #: 1: scratch row of the sine,
 #: 2: index of the mimic rule,
-#: 3: whether the rule changes the angle.
+#: 3: 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: Scratch rows. Row 0: number 0. Row 1: number 1.
 #: Rows 2 to 17: results of a frame. Row 18: a joint angle.
 #: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Integers per Jacobian column in a program for a Hessian:
+#: Number of integers per Jacobian column, in a program for a Hessian:
 #: 0: first scratch row of the column,
 #: 1: the joint's row in `steps`,
 #: 2: the joint's index in v,
-#: 3: first scratch row of six sums (derivatives with respect to the joint).
+#: 3: first scratch row of six sums of derivatives
+#: with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {
@@ -587,9 +590,9 @@ def _block_starts(indices: Sequence[int]) -> list[int]:
 
 
 #: Number of bytes in a cache line.
-#: Access to a vector in two cache lines takes twice as long.
+#: Access to a vector in two cache lines takes twice as long as access to a vector in one cache line.
 _CACHE_LINE = 64
-#: Number of each reference frame in a kernel.
+#: The integer that represents each reference frame in a kernel.
 #: Any other reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
@@ -610,7 +613,8 @@ class KernelArgs(IntEnum):
     Q = auto()
     V = auto()
     A = auto()
-    #: Address of the base's state (24 numbers); 0 for a fixed base at the world's origin.
+    #: Address of the base's state (rows of 24 numbers).
+    #: The address is 0 for a fixed base at the world's origin.
     BASE = auto()
     #: Stride (in doubles) between consecutive configurations.
     #: Stride 0: all configurations use the same row.

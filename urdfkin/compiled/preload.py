@@ -34,16 +34,17 @@ if TYPE_CHECKING:
 #: After these times (s) in plain Python, this module loads or compiles a kernel.
 #: The table in the module's docstring lists the action for each time.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
-#: The first kernel is loaded after `LOAD_AFTER` of plain Python.
-#: Each further kernel is loaded after this time of plain Python, s.
+#: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
+#: Each further kernel is loaded when plain Python has taken this time (s).
 _LOAD_NEXT_AFTER = 0.03
-#: Time that the fast function saves per call, s.
+#: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED = 5e-5
-#: Minimum time between two searches for a kernel on disk, s.
+#: Time (s) after which the cache folder is searched again for a missing kernel.
 _SEARCH_INTERVAL = 0.05
 
 KERNELS_MODULE, SINGLE_MODULE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two groups of kernels with about equal compile times, for two processes.
+#: Two groups of kernels with about equal compile times.
+#: Each of two processes compiles a group.
 _FIRST_GROUP = "accelerations", "local_accelerations", "velocities"
 _SECOND_GROUP = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -129,7 +130,8 @@ def _is_on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: The second process ends when its standard input closes.
+#: Python code for the second process.
+#: The process ends when its standard input closes.
 #: The standard input closes when the first process ends.
 _EXIT_WITH_PARENT = (
     "import os, sys, threading;"

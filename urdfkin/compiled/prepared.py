@@ -20,7 +20,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import import_lock
 
-#: f(q, out), f(q, v, out) or f(q, v, a, out); None for unsupported arguments.
+#: A function f(q, out), f(q, v, out) or f(q, v, a, out).
+#: The function returns None for unsupported arguments.
 FastFunction = Callable[..., FloatArray | None]
 
 
@@ -92,7 +93,7 @@ class PreparedFrame:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
         #: Whether `Robot.prepare` created this object.
-        #: If so, the first call loads or compiles machine code.
+        #: The first call of an object from `Robot.prepare` loads or compiles machine code.
         self.always_load = False
         # Each attribute first contains `_compute_first`.
         # `_compute_first` replaces this attribute by the fast function.
@@ -103,7 +104,7 @@ class PreparedFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # Fast functions contain memory addresses of this process.
+        # The fast functions contain memory addresses that are valid only in this process.
         # Unpickling therefore makes a new object with `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 

@@ -11,9 +11,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: No result overflows if coordinates, velocities, lengths and multipliers are below this bound.
-#: N joints: joint velocity < LARGE^2, path length d < N LARGE^2,
-#: angular velocity w < N LARGE^2, largest product w^2 d < N^3 LARGE^6.
+#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
+#: For N joints, a joint velocity is below LARGE^2, a path length d is below N LARGE^2,
+#: and an angular velocity w is below N LARGE^2.
+#: The largest product w^2 d is therefore below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
@@ -224,7 +225,7 @@ def load_constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-broadcast = Number  # The compiled `broadcast` copies a double to eight lanes.
+broadcast = Number  # The compiled `broadcast` copies a double to all eight lanes of a vector.
 
 
 def array_data(array: Any) -> Any:

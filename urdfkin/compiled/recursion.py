@@ -427,7 +427,8 @@ def _compute_block(axes, m, args, program, g, s, b, reference, orders, mask, sto
     at, stage = program[_CODE], args[_BUFFER]
     to, first = (doubles_at(stage), 0) if stage else (doubles_at(args[_OUT]), b)
     if args[_BASE] == 0 and _TRANSLATE_X <= program[at] <= _TRANSLATE:
-        # The base is at rest, so a translation changes only the position.
+        # The base is at rest.
+        # If the first instruction is a translation, only the position changes.
         state = _shift_position(state, _constant_vector(g, program[at + 4]))
         at += INSTRUCTION_WIDTH
     while program[at] != _END:

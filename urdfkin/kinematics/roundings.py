@@ -281,16 +281,14 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference of the constant poses that two programs compute
-#: from the same file, in eps per joint.
+#: Allowed difference of the constant poses that two programs compute from the same file, in eps per joint.
 #: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps,
 #: from the first and third row of the first table above.
 #: Standard deviation: 2.4 eps.
 #: 13.7 eps / 2.4 eps = 5.7.
 CONSTANT_POSE_ROUNDINGS = 13.7
 #: Rounding errors in the directions of two joint axes, in eps.
-#: Each axis: 0.5 from the division by its length,
-#: and 2.0 from Rodrigues' formula.
+#: Each axis: 0.5 from the division by its length, and 2.0 from Rodrigues' formula.
 AXIS_ROUNDINGS = 5.0
 #: Error of the angle between consecutive axes, in eps per joint.
 #: Angles in a file are rounded.

@@ -59,12 +59,10 @@ if TYPE_CHECKING:
 _OPEN = 1
 #: Maximum number of unverified robots whose details the page shows at first.
 _FAILURES_OPEN = 20
-#: If a report has more robots than this number,
-#: verified robots have no histograms.
+#: If a report has more robots than this number, verified robots have no histograms.
 #: The histograms of one robot take a second of computing time.
 _MAX_DRAWN = 100
-#: If the details of all robots have more characters than this number,
-#: each robot has a separate file.
+#: If the details of all robots have more characters than this number, each robot has a separate file.
 MOST = 5_000_000
 
 

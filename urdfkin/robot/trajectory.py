@@ -118,8 +118,7 @@ _MIN_SAMPLES = 3
 #: Names of the .npz arrays for the root link's motion:
 #: pose, velocity and acceleration.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Maximum rounding of times that causes no note to the user,
-#: as a fraction of the smallest time step.
+#: Maximum rounding of times that causes no note to the user, as a fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
@@ -606,19 +605,16 @@ def _check_columns(
         )
 
 
-#: If a joint's angles differ by more than this number (rad),
-#: the angles are not wrapped.
+#: If a joint's angles differ by more than this number (rad), the angles are not wrapped.
 #: The number is one turn plus a margin.
 #: The margin covers angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between samples,
-#: the direction of rotation is uncertain.
+#: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.
 #: Rotations by 130 and by -230 degrees lead to the same pose.
 #: Above 120 degrees, the longer rotation is below twice the shorter rotation.
 _MAX_CLEAR_ROTATION = math.tau / 3.0
 
-#: Maximum difference (rad or m) in the value of a mimic joint
-#: that counts as a rounding error.
+#: Maximum difference (rad or m) in the value of a mimic joint that counts as a rounding error.
 #: For a multiplier m with |m| > 1, the limit is |m| times this value.
 _MIMIC_ROUNDING = 1e-9
 

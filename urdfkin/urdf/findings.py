@@ -422,8 +422,7 @@ MAX_SEARCHES = 20
 #: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: If a code has at least `MIN_FOLDED` warnings or notes,
-#: one finding represents all of them.
+#: If a code has at least `MIN_FOLDED` warnings or notes, one finding represents all of them.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
 #: The codes URDF7xx refer to inertials, shapes, meshes and materials.
 #: Kinematics does not use these elements.

@@ -541,8 +541,7 @@ class NumberReader:
         )
 
 
-#: For these elements, a message about an invalid number
-#: names only the attribute.
+#: For these elements, a message about an invalid number names only the attribute.
 #: For other elements, the message also names the element.
 _ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
@@ -857,6 +856,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: If a word has more characters than this number,
-#: the word is not similar to any tag or attribute of URDF.
+#: If a word has more characters than this number, the word is not similar to any tag or attribute of URDF.
 _MAX_WORD_LENGTH = 32

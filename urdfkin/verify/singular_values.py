@@ -35,8 +35,7 @@ from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singularity import FrameJacobian, Singularity, explain_singularity
 
-#: Bound on the relative rounding error of a few dozen sums and products
-#: of positive numbers.
+#: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
 _RELATIVE_ERROR = 256.0 * EPS
 #: Maximum number of samples in the printed table.
 _MAX_ROWS = 10

@@ -35,8 +35,7 @@ _MAX_SET_SIZE = 4
 _MAX_COLUMNS = 16
 #: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
-#: At random configurations, singular values count as 0
-#: if they are below this fraction of the norm.
+#: At random configurations, singular values count as 0 if they are below this fraction of the norm.
 _NEGLIGIBLE = 1e-9
 
 

@@ -47,8 +47,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.oracle import Oracle, QueryBatch
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Largest length in a table with Hayati rows,
-#: as a multiple of the robot's reach (docs/dh.md).
+#: Largest length in a table with Hayati rows, as a multiple of the robot's reach (docs/dh.md).
 MAX_LENGTH_RATIO = 10.0
 
 

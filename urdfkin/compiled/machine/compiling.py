@@ -54,7 +54,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         if (content := read_cached_file(path)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # The digest is correct, but another version of Numba may have written the file.
+            # The file's checksum is correct, but another version of Numba may have written the file.
             # Reading such a file can cause any error.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
@@ -62,7 +62,8 @@ class KernelCache(_NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        # Code with memory addresses of this process cannot be cached.
+        # Code with dynamic globals contains memory addresses that are valid only in this process.
+        # Such code cannot be cached.
         if not cres.library.has_dynamic_globals:
             write_cached_file(self._path(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -144,8 +145,9 @@ _config: Any = numba.config  # Numba defines these settings at run time.
 #: Without fast math, the compiler neither reorders nor fuses operations.
 #: The module `numbers` decides which operations are fused.
 #: Results therefore do not depend on the compiler.
-#: Division by zero gives inf, as in C, without a branch.
-#: Functions must not allocate memory, so arrays need no reference counts.
+#: Division by zero gives inf, as in C.
+#: Loops therefore contain no branch that raises an error.
+#: The functions allocate no memory, so arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _INLINED: dict[str, Any] = {
     "forceinline": True,
@@ -191,7 +193,7 @@ def jit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 inline = jit(**_INLINED)
 
-# A read-only argument type also accepts writable arrays.
+# A read-only argument type also accepts a writable array, without a copy.
 FLOATS_1D = types.Array(types.float64, 1, "C", readonly=True)
 FLOATS_2D = types.Array(types.float64, 2, "C", readonly=True)
 INTS_1D = types.Array(types.int64, 1, "C", readonly=True)

@@ -105,12 +105,12 @@ def _make_pointer_function(kind: Any) -> Any:
     return pointer_at
 
 
-#: Convert an address to a pointer to doubles or integers.
+#: Functions that convert an address to a pointer to doubles or integers.
 doubles_at, integers_at = map(_make_pointer_function, (DOUBLES, INTEGERS))
 
 
 #: Maximum number of doubles that are prefetched.
-#: 24 KiB, half of a first-level cache of 48 KiB.
+#: 3072 doubles are 24 KiB, half of a first-level cache of 48 KiB.
 _MAX_PREFETCHED = 3072
 
 
@@ -277,6 +277,7 @@ def prefetch(x, at, count):
 
 
 #: Prefetch distance in doubles.
+#: While `x[at]` is read, `x[at + _PREFETCH_DISTANCE]` is loaded into the cache.
 _PREFETCH_DISTANCE = 512
 
 

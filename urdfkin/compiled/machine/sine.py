@@ -73,8 +73,9 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         shifted = build_fma(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
-        # d: the double nearest to pi/2. For n != 0, x and n d are multiples of 2^-53.
-        # |x - n d| < 1, so the difference is exact.
+        # Let d be the double nearest to pi/2.
+        # If n != 0, x and n d are multiples of 2^-53.
+        # |x - n d| is below 1, so this difference is exact.
         # If n is 0, the difference is x.
         # `r_error`: rounding error of r. `z_error`: rounding error of z = r^2.
         near = build_fma(builder, n, all_lanes(-PI_2), x)

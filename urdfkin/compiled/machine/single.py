@@ -51,12 +51,12 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
 #: Number of 8-byte words in a Python object's header.
 _HEADER_WORDS = object.__basicsize__ // 8
 #: A Python object consists of 8-byte words.
-#: Word `_TYPE`: address of the object's type.
-#: Word `_ITEMS` of a tuple: address of the first item.
+#: Word `_TYPE` of an object is the address of the type.
+#: Word `_ITEMS` of a tuple is the address of the first item.
 _TYPE, _ITEMS = _HEADER_WORDS - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array (C structure PyArrayObject_fields).
-#: Lower four bytes of `_NDIM`: number of axes.
-#: Lower four bytes of `_FLAGS`: flags.
+#: The lower four bytes of `_NDIM` contain the number of axes.
+#: The lower four bytes of `_FLAGS` contain the flags.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS,
     _HEADER_WORDS + 1,
@@ -64,9 +64,10 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = (
     _HEADER_WORDS + 5,
     _HEADER_WORDS + 6,
 )
-#: PyArray_Descr: type of an array's elements.
-#: Word `_KIND_AND_ORDER`: byte order and type number.
-#: `_NATIVE`: native byte order. `_DOUBLE`: type number of doubles.
+#: The C structure PyArray_Descr describes the type of an array's elements.
+#: The word `_KIND_AND_ORDER` contains the byte order and the type number.
+#: `_NATIVE` is the native byte order.
+#: `_DOUBLE` is the type number of doubles.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _HEADER_WORDS + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: `_READABLE` has NumPy's flags of an input array: C-contiguous and aligned.

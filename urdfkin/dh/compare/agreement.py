@@ -52,8 +52,7 @@ _MIN_CHANGE = 1e-10
 #: The n cells are reported if n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: The reach is computed from the positions of the tip.
-#: If the tip moves at most this fraction of the path length,
-#: the path length replaces the reach.
+#: If the tip moves at most this fraction of the path length, the path length replaces the reach.
 _FIXED_TIP_SPREAD = 1e-6
 #: Half a unit of each cell's last digit, in metres or radians.
 HalfDigits = Sequence[Mapping[str, float]]

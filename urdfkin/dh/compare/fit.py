@@ -61,8 +61,7 @@ _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
 #: Above this mean error (relative to the reach), the fit tries large offset changes.
 _ROUNDING = 1e-13
-#: At or below this tip error (relative to the reach),
-#: the fit tries no further joint signs.
+#: At or below this tip error (relative to the reach), the fit tries no further joint signs.
 _TIP_ROUNDING = 1e-12
 #: Other joint signs must reduce the tip error below this fraction.
 _OTHER_START_ERROR = 0.5

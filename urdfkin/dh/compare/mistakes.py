@@ -32,8 +32,7 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _ANGLE_TOLERANCE = 1e-9
-#: If a table has more possible corrections than this number,
-#: joint offsets and joint signs are not fitted.
+#: If a table has more possible corrections than this number, joint offsets and joint signs are not fitted.
 _MAX_FITS = 100
 
 

@@ -62,8 +62,7 @@ from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS
 from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A unit vector counts as parallel to an axis if its perpendicular component is
-#: smaller than this.
+#: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
 PARALLEL_TOLERANCE = 1e-12
 
 

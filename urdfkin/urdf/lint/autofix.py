@@ -126,8 +126,7 @@ def find_differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str,
 
 
 def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str | None:
-    # A change of roll, pitch or yaw by an angle
-    # rotates the frame by at most the same angle.
+    # A change of roll, pitch or yaw by an angle rotates the frame by at most the same angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {

@@ -40,8 +40,7 @@ _BASE_DIGITS = 30
 _BITS_PER_DIGIT = math.log2(10.0)
 #: bits of an interval = ceil(digits * log2(10)) + 5
 #: 15 digits: 50 + 5 = 55 bits
-#: With 53 bits, an interval could be four times as wide
-#: as the distance between neighbouring doubles.
+#: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
 #: Significant digits of a written decimal; 17 digits determine a double.
 _SIGNIFICANT_DIGITS = 17

@@ -136,8 +136,7 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If an axis length differs from 1 by less than this number,
-#: the finding is a note.
+#: If an axis length differs from 1 by less than this number, the finding is a note.
 #: Rounding the axis to few digits causes such small differences.
 NOTE_LENGTH_ERROR = 2e-4
 
@@ -152,8 +151,7 @@ _Z_AXIS_TOLERANCE = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _EIGEN_TOLERANCE = 1e-12
 
-#: Maximum angle (rad) between an axis and a coordinate axis
-#: that is not reported.
+#: Maximum angle (rad) between an axis and a coordinate axis that is not reported.
 #: The error bounds in `verify.bounds` cover this difference.
 _NEGLIGIBLE_TILT = 2.0**-52
 
@@ -509,8 +507,7 @@ NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 #: Minimum coordinate (m) of a joint origin that is probably in millimetres.
 SUSPICIOUS_LENGTH = 100.0
 
-#: If a robot's total length (m) is below this number,
-#: the lengths were probably scaled twice.
+#: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
 #: A limit is probably in degrees if it is a whole number from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT`.
