@@ -187,9 +187,9 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 # -- planar and floating joints -----------------------------------------------------------------------
-# The joint's velocity is in the axes of the link after the joint.
-# b: time derivatives of its components.
-# These axes rotate with the angular velocity w + o.
+# The joint's velocity is expressed in the axes of the link after the joint.
+# The vector b contains the time derivatives of the components of this velocity.
+# The axes of the link after the joint rotate with the angular velocity w + o.
 
 
 def free_angular_acceleration(alpha, w, o, b):

@@ -11,18 +11,19 @@ from urdfkin.system.lazy_import import is_instance
 
 FloatArray = NDArray[np.float64]
 
-#: Tolerance of a unit vector's norm.
-#: Normalising in double precision has an error of at most 4e-16.
-#: Rodrigues' formula for an axis with six decimals: |R R^T - I| can be 1e-6.
+#: Largest accepted difference between 1 and the norm of a unit vector.
+#: If a vector is normalised in double precision, its norm differs from 1 by at most 4e-16.
+#: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
 UNIT_TOLERANCE = 1e-12
 #: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
-#: R with nine decimals: each entry has an error of at most 5e-10.
-#: Entry of R R^T: dot product of two rows of R.
-#: Sum of the absolute entries of a row: at most sqrt(3).
+#: If R is rounded to nine decimals, every entry of R has an error of at most 5e-10.
+#: An entry of R R^T is the dot product of two rows of R.
+#: The absolute values of the entries in a row of R sum to at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: `dtype.kind` of complex numbers, bytes, text, timedelta, datetime and void.
-#: NumPy converts such data to floats without an error.
+#: Letters of NumPy's `dtype.kind` for data that are not real numbers.
+#: These data are complex numbers, bytes, text, timedelta, datetime and void.
+#: NumPy converts these data to floats without reporting an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
@@ -36,7 +37,7 @@ def as_floats(value: ArrayLike, name: str) -> FloatArray:
         array = np.asarray(value)
         if array.dtype.kind in _NOT_NUMBERS:
             raise TypeError(array.dtype)
-        # NumPy would convert text and None to numbers or NaN.
+        # Without this check, NumPy converts text and None in an object array to numbers or NaN.
         if array.dtype.kind == "O" and not all(map(is_real, array.flat)):
             raise TypeError(array.dtype)
         return np.asarray(array, dtype=np.float64)

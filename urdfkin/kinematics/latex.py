@@ -12,8 +12,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bind_equations
 
-#: The textbook's LaTeX symbols for parameters in `equations`.
-#: Other parameters use their names.
+#: The textbook's LaTeX symbols for parameters of the functions in `equations`. The keys are parameter names.
+#: If a parameter has no entry, its name is the LaTeX symbol.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -28,7 +28,8 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: LaTeX symbols for the parameters of one function.
+#: LaTeX symbols that apply only to the parameters of one function. The keys are function names.
+#: An entry for a function has priority over `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},

@@ -19,11 +19,11 @@ _MOST_STEPS = 100
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 #: Factor of the damping after a step that reduces the error, and factor after a rejected step.
 _DAMPING_DECREASE, _DAMPING_INCREASE = 0.03, 10.0
-#: slow step: new error > _SLOW * old error
+#: A step is slow if new error > _SLOW * old error.
 _SLOW = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: relative rounding error of the norm of n residuals <= _NORM_ROUNDING * n * eps
+#: The norm of n residuals has a relative rounding error of at most this number times n eps.
 _NORM_ROUNDING = 4.0
 
 

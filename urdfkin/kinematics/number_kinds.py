@@ -87,7 +87,8 @@ def norm(x: FloatArray) -> FloatArray:
     )  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: Arguments: lengths of vectors and absolute values of numbers.
+#: For each equation, a function that returns the scale of the result.
+#: The arguments are lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bind_equations(
     plus=add,

@@ -96,7 +96,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ as_matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: R stays unchanged if |nearest rotation - R| <= ROUNDED.
+#: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
 ROUNDED = 1e-15
 
 
@@ -193,7 +193,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     return total
 
 
-#: Tolerance of a quaternion's norm.
+#: Largest accepted difference between 1 and the norm of a quaternion.
 NORM_TOLERANCE = 1e-6
 
 
@@ -388,8 +388,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # The square of a number below 1e-150 may lose digits.
-    # For small sine: angle / sine = 2.
+    # Squares of components below 1e-150 may lose digits. For such a vector, the result is 2 times `vector`.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -509,11 +508,13 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R = F S T, rotations about the three axes; F^T R = S T.
-    # S turns about axis `j`, so row `j` of S T is row `j` of T.
+    # F, S and T are rotations about the three axes.
+    # R = F S T, so F^T R = S T.
+    # S turns about axis `j`.
+    # Therefore, S T and T have the same row `j`.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # Row `j` is nonzero only for the second axis and `rest`.
+    # Row `j` has nonzero entries only for the second axis and `rest`.
     rest, sense = (m, sign) if axes.is_proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.reorder(np.stack((first, second, third), axis=-1)).copy()
@@ -532,8 +533,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Default of `nearest`, rad.
-#: At this distance, the condition number of Omega is 2e9.
+#: At this distance (rad) or less from the singularity, Euler angle rates have too few correct digits.
 NEAREST = 1e-9
 
 

@@ -260,8 +260,9 @@ MIN_DIVISOR = 1e-300
 #: `factors` is the number of factors of a term. For example, the term w x (w x d) has three factors.
 PINOCCHIO_ROUNDINGS = 24.0
 #: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
-#: `joints`: the number for Pinocchio.
-#: `factors`: twice the number for Pinocchio (`urdfkin.verify.bounds`).
+#: `joints` is the same number as for Pinocchio.
+#: `factors` is twice the number for Pinocchio.
+#: The reason is that MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0
@@ -299,36 +300,40 @@ AXIS_ROUNDINGS = 5.0
 #: Therefore, the error is twice 22.5 eps.
 FILE_ROUNDINGS = 45.0
 #: Rounding error of a length along a joint axis.
-#: Unit: eps times the length of the path.
-#: Dot product: 2.4 eps. Sum of lengths: 0.5 eps times the sum.
-#: Most of these sums are clearly shorter than the path.
+#: The unit of the error is eps times the length of the path.
+#: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
+#: Only a few of these sums are nearly as large as the length of the path.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
 
-#: Rounding error of an angle between -pi and pi, in eps rad.
-#: Computed multiple of pi/12: 1.2. Value of arctan2: 1.1.
-#: Number in a file: 1.0.
+#: Rounding error (in eps rad) of an angle between -pi and pi.
+#: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
+#: A number in a file has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
-#: Error of a rotation matrix entry, in eps.
-#: entry = a x - b y: 0.75
-#: x = c d - e f, y = g h - k l: 0.75
+#: Error (in eps) of an entry of a rotation matrix.
+#: The entry is a difference of two products. This difference causes an error of 0.75.
+#: In each of the two products, one factor is a difference of two other products.
+#: This factor adds an error of 0.75.
 ENTRY_ROUNDINGS = 2.0
-#: Largest change when a length is rounded to twelve digits.
-#: Unit: eps times the length of the path.
+#: A length is rounded to twelve digits if the length changes by at most this number.
+#: The unit of the change is eps times the length of the path.
 DECIMAL_ROUNDINGS = LENGTH_ROUNDINGS / 2.0
 #: Error (in eps) of the angle between two rotations.
-#: First rotation, from roll, pitch and yaw: 3.1 eps.
+#: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
 #: The product's error is the sum of four errors.
-#: Sines and cosines: 0.5 each.
-#: Two matrix multiplications: 1.4 and 1.8.
+#: The sines and the cosines have an error of 0.5 each.
+#: The two matrix multiplications have the errors 1.4 and 1.8.
 ROTATION_ROUNDINGS = 8.0
 
-#: Allowed error of a mimicked joint's computed limit, in eps.
-#: Subtraction, division, multiplication and addition: 0.5 each.
+#: Allowed error (in eps) of a mimicked joint's computed limit.
+#: urdfkin computes this limit from a mimic joint's limit.
+#: The conversion has a subtraction and a division.
+#: The mimic rule has a multiplication and an addition.
+#: Each of these four operations has an error of 0.5.
 #: The sum of the four errors is 2.0.
-#: With 4.0, the mimic joint's limits allow both computed ends.
+#: `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the converted range are accepted.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 

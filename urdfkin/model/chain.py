@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: size of a robot = max(computed size, MIN_ROBOT_SIZE), m
-#: If all frames coincide, the computed size is 0.
+#: Minimum size (m) of a robot in a comparison.
+#: If all frames coincide, the computed size of the robot is 0.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -267,7 +267,7 @@ def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameC
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             pose_counts.append(count)
-            # From child to parent, the constant pose follows the joint's motion.
+            # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

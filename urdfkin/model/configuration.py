@@ -46,15 +46,15 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest absolute value of a random joint value, rad or m.
-#: Revolute and prismatic joints without limits: -10 to 10.
-#: Continuous joints: -pi to pi.
-#: Some upper bounds assume this travel (m) of joints without limits:
-#: planar, floating, and prismatic joints.
+#: Largest absolute value (rad or m) of a random joint value.
+#: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
+#: A random value of a continuous joint is between -pi and pi.
+#: Some upper bounds hold only if the joints without limits travel at most this distance (m) from zero.
+#: Such joints are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
-#: These upper bounds also hold for a shorter travel.
+#: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0
-#: Condition of these upper bounds, as text.
+#: Text of the condition under which an upper bound holds.
 TRAVEL_CONDITION = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
 
 
@@ -171,7 +171,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     # Rounding errors narrow the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # For example, the limits (0, inf).
+    if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )
@@ -198,7 +198,8 @@ _Q_SUFFIXES = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
 }
-#: Suffixes of velocity names, and units without "/s" for v or "/s^2" for a.
+#: Suffix and unit of each velocity of a planar or floating joint.
+#: The unit lacks "/s" for v and "/s^2" for a.
 _VELOCITY_SUFFIXES = {
     JointKind.PLANAR: {"vx": "m", "vy": "m", "wz": "rad"},
     JointKind.FLOATING: {"vx": "m", "vy": "m", "vz": "m", "wx": "rad", "wy": "rad", "wz": "rad"},
@@ -490,7 +491,9 @@ def _degrees_hint(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Maximum number of configurations in the search for degrees.
+#: Maximum number of configurations in which urdfkin looks for angles in degrees.
+#: All configurations of a batch have the same unit.
+#: Therefore, a few configurations are enough.
 _MAX_CHECKED = 16
 
 

@@ -9,7 +9,7 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.model.configuration import range_reductions
 from urdfkin.model.tree import Joint, KinematicTree
 
-#: Columns of the table of joints; limits in rad, rad/s, m, m/s.
+#: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
 #: Left-aligned columns in the table of `summarize`.
 TEXT_COLUMNS = (0, 1, 2, 3, 4, 5, 9)

@@ -107,9 +107,12 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle, rad; some wrists turn 400 degrees.
+#: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
-#: Margins of `far_limits`: rad or m, and fraction of the joint's range.
+#: A joint value is far outside the limits if both of the following conditions hold.
+#: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
+#: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
+#: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
 _FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 

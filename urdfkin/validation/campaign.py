@@ -150,7 +150,7 @@ def validate(
             if saved is not None:
                 campaign.load_answers(saved)
             for i, error in unread.items():
-                # `missing_chunks` ends after the first failure.
+                # A stored failure ends the inner loop, so each unreadable robot gets only one failure.
                 for index in collector.missing_chunks(i):
                     campaign.save(campaign.task(i, index), make_failure(robot_inputs[i], error))
             missing = [
@@ -238,8 +238,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: Above this number of samples, loading kernels from disk saves time.
-#: Above this number of samples, compiling kernels saves time.
+#: Above _WORTH_LOADING samples, loading kernels from disk saves time.
+#: Above _WORTH_COMPILING samples, compiling missing kernels saves time.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

@@ -45,6 +45,7 @@ DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
 SPECIAL_SAMPLES = 3
 #: Minimum number of chunks of a robot with 200 or more samples.
+#: Several workers can then share the robot.
 _MIN_CHUNKS = 8
 #: A chunk has at most _MAX_DRAWS * DRAW_SIZE = 1000 random configurations.
 #: A chunk of this size takes one second for a typical robot.
@@ -351,8 +352,8 @@ def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> Fl
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]
-#: The cache contains only the latest robot.
-#: Two large robots would need too much memory.
+#: The cache contains only the latest robot. A worker gets the chunks of a robot one after another.
+#: Two large robots in the cache would need too much memory.
 _cache: dict[RobotInput, _Models] = {}
 
 

@@ -42,13 +42,14 @@ from urdfkin.verify.oracles import version
 #: `threads` is the sum over all workers.
 #: Every thread then always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
-#: Maximum number of times that a chunk is sent.
-#: Chunks run in separate processes, so robots cannot crash Dask workers.
+#: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
+#: A high number is safe, because a robot cannot crash a Dask worker.
+#: The worker runs each chunk in a separate process.
 _TRIES = 20
-#: Interval for counting the workers, s.
+#: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
-#: Packages that must have the same version on the scheduler.
-#: The scheduler may lack these packages.
+#: The scheduler does not need these packages.
+#: If the scheduler has one of the packages, the package must have the same version as in this process.
 _COMPARED_PACKAGES = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -210,7 +211,7 @@ class Cluster:
         #: Sent chunks without an answer.
         #: Task of each chunk, and how often the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: Text of each robot, stored on the workers.
+        #: For each robot, a future of the text that describes the robot. The workers store this text.
         self._robots: dict[int, Future[bytes]] = {}
         #: Number of chunks without an answer for each robot.
         self._in_use = Counter[int]()

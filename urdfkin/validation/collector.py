@@ -154,8 +154,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, robot_input: RobotInput, requested_samples: int) -> RobotReport:
-        # The report contains the results before the first failed chunk.
-        # The workers' speed determines which later chunks are finished.
+        # The report contains only results of chunks before the first failed chunk.
+        # The speed of the workers determines which later chunks are finished.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake with a larger `Diagnosis.remainder` is not reported.
+#: A mistake explains the user's results if `Diagnosis.remainder` is at most this number.
 EXPLANATION_TOLERANCE = 1e-3
 _MAX_MISTAKES = 3
 #: Number of configurations in a fast first test for exchanged joints.
 _FIRST_SAMPLES = 4
 #: Each difference is divided by its scale. The smallest scale is _MIN_SCALE * (largest scale).
 _MIN_SCALE = 1e-9
-#: Numbers are equal within _EQUALITY_TOLERANCE * scale.
+#: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
 #: Indices that exchange the linear and the angular rows.
 _HALVES = [3, 4, 5, 0, 1, 2]
@@ -109,7 +109,8 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: (sentence, function); the function returns urdfkin's results with the mistake.
+#: A common mistake: a sentence that describes the mistake, and a function.
+#: The function returns urdfkin's results with the mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 

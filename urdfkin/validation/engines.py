@@ -33,7 +33,7 @@ class Task:
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Callback for a task and its answer, at most once per task.
+#: Function that an engine calls with a task and its answer. A task has at most one answer.
 AnswerCallback = Callable[[Task, Answer], None]
 
 

@@ -23,10 +23,10 @@ from urdfkin.model.tree import KinematicTree
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Workspace of Pinocchio 4.1.0: _PER_CUBE * nv^3 + _PER_LINK * links, bytes.
+#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
 #: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time.
+#: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -101,6 +101,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
             counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
+            # Linux counts cached files as used memory.
             # Linux frees the memory of inactive cached files on demand.
             cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
             yield max(0, int(numbers[0]) - int(numbers[1]) + cached)

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 
 #: Maximum number of bytes in an answer.
 _MAX_ANSWER_BYTES = 64 * 2**20
-#: Maximum number of quoted bytes of standard error.
+#: Maximum number of quoted bytes of the program's standard error.
 _MAX_ERROR_BYTES = 300
-#: Number of consecutive failures after which the program is not called again.
+#: Number of consecutive failures after which the program is not started again.
 _MAX_FAILURES = 3
 _DAY = 86400.0
 

@@ -21,10 +21,12 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of `run`: a word and data.
-#: "answer": the pickled answer of the chunk.
-#: "died": signal or exit status of the second crash.
-#: "other code": different versions or digests of the worker.
+#: Return value of `run` for a chunk: a word and data.
+#: "answer": The data are the pickled answer of the chunk.
+#: "died": The chunk crashed two processes.
+#: The data name the signal or exit status of the second crash.
+#: "other code": The worker's versions or digests differ from the client's.
+#: The data are the worker's versions or digests.
 ChunkOutcome = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that compute no results.
+#: Packages that display results, but compute no results. Their code may change during a campaign.
 _DISPLAY = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -104,6 +104,7 @@ class RobotReport:
             return None
         row = QUANTITIES[quantity]
         # A link may have the same name as a joint.
+        # Therefore, a joint needs the prefix "joint:".
         frame = case.frame if row.object_kind == "frames" else f"joint:{case.frame}"
         origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})

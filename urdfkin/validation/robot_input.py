@@ -91,7 +91,7 @@ class RobotInput:
                 source_findings=self.listed,
                 is_generated=self.made,
             )
-        robot.verifier.origin = self.origin  # The origin names the original file.
+        robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
 
     def load(self) -> Robot:

@@ -64,11 +64,11 @@ LICENCE = "CC0-1.0"
 #: Number of configurations of each robot. The first configuration is the zero configuration.
 #: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
-#: Random velocities and accelerations are from -_RANGE to _RANGE.
-#: Random positions of planar and floating joints are also from -_RANGE to _RANGE.
+#: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
+#: Random positions of planar and floating joints are in the same interval.
 _RANGE = 2.0
-#: Inputs are rounded to multiples of 1 / _GRID.
-#: Exceptions are quaternions and limits. Multiples of 1 / 1024 are exact as decimals and doubles.
+#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
+#: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _GRID = 1024.0
 #: A tolerance is first rounded to 12 significant digits.
 #: Then the tolerance is rounded upward to 3 significant digits.

@@ -51,8 +51,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # The worker process has a copy of `theirs`.
-            # If the worker ends, `connection.recv()` then raises EOFError.
+            # Both processes have the worker's end of the pipe. Close this end in the parent process.
+            # The pipe then closes as soon as the worker ends.
             theirs.close()
 
     @property
@@ -170,8 +170,8 @@ class _WorkerPool:
         self._jobs, self._on_answer, self._alone = jobs, on_answer, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: The unfinished tasks of each robot after a crash.
-        #: These tasks run after all others.
+        #: The unfinished tasks of each robot that crashed a process.
+        #: These tasks run after the tasks of all other robots.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:

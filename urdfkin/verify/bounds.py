@@ -70,7 +70,7 @@ from urdfkin.model.tree import FloatArray
 
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: First indices of p, w, vel, alpha and acc in `BaseMotion.state`.
+#: First indices of position, velocities and accelerations in the state of a moving base.
 _BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
 #: Number of configurations per block of the kernel `lengths`.
 #: A block fits into the L1 cache.
@@ -143,7 +143,7 @@ def _fill_with_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArra
     The bits equal those of `_fill_without_kernel`.
     """
     links = lengths.links
-    # The stride is 0 if all configurations share one row.
+    # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -558,14 +558,13 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Cross products in the linear rows of Pinocchio's Hessian.
-#: A Hessian entry is d(Jacobian column i) / d(coordinate of joint j).
+#: Numbers of cross products in the linear rows of Pinocchio's Hessian.
+#: A Hessian entry is the derivative of a Jacobian column.
+#: Column i is differentiated with respect to the coordinate of joint j.
 #: The joints on the path are numbered from the root.
-#: Layout: ((a, b), (c, d)).
-#: a, b: j <= i
-#: c, d: j > i
-#: a, c: products z x (z x d) of two revolute joints
-#: b, d: products z x z of a revolute and a prismatic joint
+#: Each reference frame has two pairs of numbers: one pair for j <= i, and one pair for j > i.
+#: The first of the two numbers counts the products z x (z x d), which occur for two revolute joints.
+#: The second number counts the products z x z, which occur for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -718,7 +717,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.IS_ROTATION] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        # The array is stored last, because other threads read the cache.
+        # The array is stored only when it is complete, because other threads may read the cache.
         plan.cache["column weights"] = weights
     return weights[0], weights[1]
 

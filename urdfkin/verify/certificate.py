@@ -327,5 +327,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # The copy may be used in another process.
+        # The counts are not copied, because the copy may be used in another process.
         return type(self), ()

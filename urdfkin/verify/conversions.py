@@ -55,10 +55,10 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 #: Number of random configurations besides the zero configuration.
 _SAMPLE_COUNT = 8
-#: Rounding errors of urdfkin and Pinocchio in `check_orientations`, in eps.
-#: Each program has an error below 8 eps.
-#: operations for angles: arctan2, sine, cosine, products of three numbers
-#: operations for quaternions: square root, quotient, products of two numbers
+#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
+#: The error of each program is less than 8 eps.
+#: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
+#: Quaternions need a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
@@ -134,8 +134,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio's placements of base and tip are relative to the root.
-    # The product of exponentials is relative to the base.
+    # Pinocchio computes the placements of the base and the tip relative to the root.
+    # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (joint_roundings(joints) + size) + sum_zeroed_tilts(path)
@@ -273,9 +273,9 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The table's base and tool may be rounded to six digits.
+    # The rotation matrices of the table's base and tool may be rounded to six digits.
     # The URDF contains exact rotations.
-    # The bound includes the deviation of these matrices from rotations.
+    # The bound therefore includes the deviation of the table's matrices from rotation matrices.
     rows, metres, defect = len(table.rows), table.rounding(own), _orthogonality_defect(table)
     turn = EPS * read_back_roundings(rows) + defect
     allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))

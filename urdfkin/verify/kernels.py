@@ -32,7 +32,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
 
 _INFINITY_BITS = 0x7FF0000000000000
 _MASK_WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Prefetch distance in rows.
+#: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
 _PREFETCH_DISTANCE = 4
 
 

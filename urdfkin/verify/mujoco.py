@@ -47,8 +47,8 @@ from urdfkin.verify.pinocchio import tree_depth
 #: Placeholder for masses (kg) and moments of inertia (kg m^2).
 _MASS = "1"
 #: Maximum number of links in a chain.
-#: Loading time grows with the square of the number of links.
-#: MuJoCo rejects chains of more than 1,023 links after loading.
+#: MuJoCo's loading time grows with the square of the number of links.
+#: MuJoCo rejects a chain of more than 1,023 links only after loading the chain.
 _MAX_DEPTH = 1_000
 #: MuJoCo's joints for a planar or floating joint, in coordinate order.
 _REPLACEMENT_JOINTS = {
@@ -56,7 +56,8 @@ _REPLACEMENT_JOINTS = {
     "floating": ("slide x", "slide y", "slide z", "ball"),
 }
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Sizes (nq, nv) of joints. Other kinds have (1, 1).
+#: Numbers of coordinates and joint velocities for each kind of joint.
+#: Kinds without an entry have one coordinate and one joint velocity.
 _JOINT_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -162,7 +163,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        # MuJoCo requires these limits, but its kinematics ignores them.
+        # MuJoCo requires limits of a prismatic joint, but MuJoCo's kinematics ignores the limits.
         if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
@@ -243,7 +244,7 @@ class MujocoOracle(Oracle):
         poses = self._compute_poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # In rotating axes, J-dot has the term -w x J.
+        if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _change_reference(which, poses, rate, columns=True)
@@ -334,7 +335,7 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._velocity_matrix_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # Slide joints move in world axes, the ball joint in the base's axes.
+            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]

@@ -166,7 +166,8 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._select_by_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio can use q and v without conversion.
+        #: `_same_q` is True if Pinocchio can use q without conversion.
+        #: `_same_v` is True if Pinocchio can use v without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -333,8 +334,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """
     K = davenport_matrix(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # Rounding adds small components along other eigenvectors of K.
-    # (K + I) x = 4 q (q^T x), without these components
+    # Because of rounding, the computed q has small components along the other eigenvectors of K.
+    # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit

@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import (
 )
 
 #: urdfkin requires these versions of Pinocchio.
-#: Versions for which tests confirm accelerations and J-dot.
+#: Tests confirm the definitions of accelerations and J-dot only for these versions.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -107,13 +107,12 @@ def _find_project(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Stack per link, bytes; Pinocchio 4.1.0 needs less than 4 kB.
+#: Bytes of stack for each link.
+#: The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
 _STACK_BYTES_PER_LINK = 16_384
-#: Chains with fewer links cause no stack overflow in any thread.
+#: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
-#: Maximum nv.
-#: memory of Pinocchio 4.1.0, measured: about 64 nv^3 bytes
-#: nv = 315: 2 GB
+#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MAX_NV = 315
 
 #: Number of floating-point values in a block of results.
@@ -172,7 +171,7 @@ def _reduce_model(model: Any, text: str, lock: Mapping[str, float], *, lock_mimi
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses links and joints of the same name.
+    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_PREFIX + frame.name
@@ -190,7 +189,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` finds known causes before Pinocchio reads the text.
+        # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
         # The cause of this error is therefore unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",

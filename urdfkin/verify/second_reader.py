@@ -31,19 +31,19 @@ from urdfkin.verify.oracle import resolve_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference of rotation matrix entries for equal angles.
-#: three factors, sines or cosines: at most 3 eps
-#: two products and a sum, all <= 1: at most 3 * 0.5 eps
-#: two programs: 2 * (3 + 1.5) eps = 9 eps
+#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
+#: A sine and a cosine have an error of one eps each.
+#: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
-#: Bound on the difference of normalised axis components.
-#: The length has an error of 2 eps; the quotient adds one rounding.
+#: Bound on the difference between two programs' normalised axes, per component.
+#: The length has an error of 2 eps.
+#: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
-#: Tolerance of the length of yourdfpy's axes.
+#: Largest accepted difference between 1 and the length of yourdfpy's axis.
 _UNIT_TOLERANCE = 1e-6
 _MAX_DIFFERENCES = 8
 _MAX_QUOTE_LENGTH = 200
-#: Joints with position limits in the URDF specification.
+#: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED_KINDS = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -115,7 +115,7 @@ def read_with_yourdfpy(text: str) -> yourdf.Robot:
     """
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
-    # An XML declaration may name another encoding than UTF-8.
+    # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True

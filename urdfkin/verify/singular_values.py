@@ -255,7 +255,7 @@ def _orthogonality_error(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Bound the Frobenius norm of non-negative matrices."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # The norm of a matrix with inf is inf.
+    # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

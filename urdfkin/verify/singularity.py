@@ -29,9 +29,9 @@ from urdfkin.errors.display import Displayable, TextDocument, format_number
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Largest size of a set of linearly dependent columns.
+#: The search finds minimal sets of at most `_MAX_SET_SIZE` linearly dependent columns.
 _MAX_SET_SIZE = 4
-#: Jacobians with more columns are not searched for dependent sets.
+#: The search is skipped for a Jacobian with more than `_MAX_COLUMNS` columns.
 _MAX_COLUMNS = 16
 #: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
@@ -152,8 +152,8 @@ class _Explanation:
         usual, never = self._compare_samples()
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
-        # With more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, the lost directions are unknown.
+        # If the Jacobian has more rows than columns, the frame never moves in some directions.
+        # If these directions depend on q, urdfkin cannot determine the lost directions of this configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -282,7 +282,7 @@ class _Explanation:
         # Four such lines need not lie in one plane.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # Axes through a point a satisfy v = a x z.
+        # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
@@ -341,7 +341,7 @@ def _sparse_basis(rows: FloatArray) -> FloatArray:
 
 def _orthonormal_basis(rows: FloatArray) -> FloatArray:
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    # Each singular value is 1 or 0 up to rounding.
+    # Each singular value is 1 or 0, except for rounding.
     return Vt[: int((s > 0.5).sum())]
 
 

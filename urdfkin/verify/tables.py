@@ -170,8 +170,9 @@ def _compare_with_bounds(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Layout: (linear, angular), each (scale of rounding errors, effect of snapping).
-    #: bound = scale * relative rounding error + effect of snapping
+    #: Each quantity has one pair of numbers for linear differences, and one pair for angular differences.
+    #: The first number of a pair is the scale of rounding errors; the second is the effect of snapping.
+    #: The bound on a difference is the scale times the relative rounding error, plus the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, snap_effect.metres), (one, snap_effect.turn)),
         "jacobian": (
@@ -289,8 +290,8 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     own = table_length(table)
     reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
-    # `Joint.tilt`: angle between the joint's axes in urdfkin and Pinocchio.
-    # A term of a relative acceleration contains at most four vectors.
+    # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
+    # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))
     return ErrorScales(reach, weights[True], weights[False], rates, accelerations, rounding)

@@ -41,13 +41,13 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: Angle between the joint frames of OpenUSD and urdfkin, see `_check_joint`.
-#: angle <= 18 * SINGLE_ROUNDOFF rad
+#: The joint frames of OpenUSD's parser and of urdfkin may differ by an angle (rad).
+#: The angle is at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
-#: Rounding errors in a joint's origin, see `_check_joint`.
+#: Number of rounding errors in a joint's origin; `_check_joint` derives this number.
 _ORIGIN_ROUNDINGS = 3.0
 #: A prim's transform consists of operations, such as rotations.
-#: Largest angle error of one operation, in `SINGLE_ROUNDOFF` rad.
+#: The angle error (rad) of one operation is at most `_TRANSFORM_ROUNDINGS * SINGLE_ROUNDOFF`.
 #: `_compare_prims` derives this bound.
 _TRANSFORM_ROUNDINGS = 6.0 * np.pi
 
@@ -308,7 +308,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
             f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
             f" by up to {worst[0]:.3g} m"
         )
-        # A wrong joint also displaces all later bodies.
+        # An error of one body displaces all later bodies, so only the first difference is reported.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -66,7 +66,8 @@ def _read_joints_twice(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI also has an ArticulationDesc.
+            # A joint with PhysicsArticulationRootAPI has two descriptions in OpenUSD.
+            # One describes the joint, and the other describes an articulation and is skipped.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _describe_joint(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}

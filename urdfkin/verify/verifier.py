@@ -53,7 +53,8 @@ Verify = bool | Literal["sample"]
 
 SAMPLE = 100
 
-#: Maximum number of compared values, to fit into the cache.
+#: Maximum number of values that are compared at once.
+#: The values then fit into the processor's cache.
 _MAX_VALUES = 262_144
 #: Maximum number of configurations that are compared at once.
 _MAX_CONFIGURATIONS = 4096
@@ -100,7 +101,7 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy builds its own Pinocchio and MuJoCo models.
+        # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, library: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -133,7 +134,7 @@ class Verifier:
         )
 
     def with_lock(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        # Pinocchio may accept a robot with fewer moving joints.
+        # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
         known = self.known_refusal if self.known_refusal not in self._refusals.values() else None
         verifier = Verifier(
             self.text,

@@ -19,8 +19,9 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST_EQUATION = 130
+#: Numbers of the equations whose statements are unknown.
 #: Page 2 of the chapter, with equations 7.6 to 7.10, is lost.
-#: Section 7.2 repeats equation 7.7.
+#: Equation 7.7 is known, because section 7.2 repeats equation 7.7.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (

@@ -194,7 +194,7 @@ class Conversion:
             # The loop also visits the links that it appends.
             for parent in links:
                 for i in children.get(parent, []):
-                    # Locked joints still move in the target program.
+                    # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].original.kind.nv or not merged:
                         joints.append(i)
                     else:

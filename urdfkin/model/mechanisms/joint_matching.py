@@ -239,7 +239,7 @@ class _JointGeometry:
 
 
 def _line_difference(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    if kind == "floating":  # a floating joint reaches every pose
+    if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
         return 0.0, 0.0
     return line_difference(s, t, with_distance=kind == "turns")
 
@@ -325,8 +325,8 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # Without a later axis on this branch, axes of other branches determine the pose of B's root.
-        # For example, each rotor of a drone is a branch with one joint.
+        # If a branch has no joint after this axis, the axes of other branches determine the pose of B's root.
+        # For example, each rotor of a drone has a branch of its own with a single joint.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
@@ -367,7 +367,7 @@ def root_poses_by_siblings(
                 pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
-            # The next axes must determine the shift along u.
+            # The axes of the next joints must determine the shift along u.
             if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)

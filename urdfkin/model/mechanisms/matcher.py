@@ -68,7 +68,7 @@ MOST_ROOT_POSES = 48
 #: The smaller difference must be less than this factor times the larger difference.
 BETTER_RATIO = 0.5
 
-#: A zero offset (rad or m), or the motion N of a planar or floating joint.
+#: A zero offset (rad or m), or a pose for a planar or floating joint.
 _Choice = TypeVar("_Choice", float, FloatArray)
 #: Number of agreeing links and axes, and largest difference (m).
 Score = tuple[int, float]
@@ -233,7 +233,7 @@ class MechanismMatcher:
             yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
-        # B's root can match a body of A after a joint, for example after a floating root joint.
+        # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
         body_a = _find_shared_body(self.b, self.a)
         if body_a is not None:
             yield body_a, 0
@@ -422,8 +422,9 @@ class MechanismMatcher:
             )
         body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
-        # P_a, P_b: the joint's poses in A and B; P_b = M P_a N.
-        # If the path leads from child to parent, P_a and P_b are the inverse poses.
+        # P_a and P_b are the joint's poses in A and B.
+        # P_b = M P_a N.
+        # For a path from child to parent, both poses are inverted.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
@@ -646,7 +647,7 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
 #: Maximum number of joint orders that are tried; five prismatic joints have 120 orders.
 MOST_ORDERS = 120
 #: Maximum number of later joint pairs that a search compares; see `LookAhead`.
-#: Without names, TALOS needs 500 pairs, and Baxter 1,000.
+#: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_LOOK_AHEAD = 2000
 #: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
@@ -711,7 +712,7 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
 
     Robots with mirrored arms can need exchanges.
     """
-    # If a joint has no partner, no exchange makes the models agree.
+    # If a joint exists in one model only, no exchange of pairs makes the two models agree.
     if best.only_a or best.only_b:
         return best
     tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)

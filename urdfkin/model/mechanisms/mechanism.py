@@ -718,10 +718,11 @@ class MatchedValues:
     #: Value of B's joint with the sign and zero of B's URDF:
     #: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
-    #: If the computed functions differ by rounding only, `b` is set to `a`,
-    #: and `rounding` (rad or m) is max(0, D - E). Otherwise, `rounding` is 0.
-    #: D: absolute difference of the constants of both computed functions.
-    #: E: rounding error of one joint.
+    #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
+    #: `rounding` (rad or m) is then max(0, D - E).
+    #: D is the absolute difference between the constants of the two computed functions.
+    #: E is the rounding error of one joint.
+    #: If the functions differ by more than rounding, `rounding` is 0.
     rounding: float = 0.0
 
     @property

@@ -301,7 +301,7 @@ def _angle_bound(
         if step.kind != "turns" or pair is None:
             continue
         if step.axis_b is not step.axis_a:
-            # R: the joint's rotation by t. Q: rotation by the tilt s.
+            # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes.
             # For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))

@@ -31,10 +31,9 @@ from urdfkin.system.plain_xml import parse_xml
 from urdfkin.verify.bounds import DecimalErrors
 
 #: Least number of decimal digits in the accuracy study.
-#: 50 digits measure the rounding errors of doubles with 16 digits.
+#: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 DIGITS = 50
-#: Decimal digits for a path without joints.
-#: 30 = 2 * (15 digits of a double)
+#: Number of decimal digits for a path without joints: twice the 15 decimal digits of a double.
 _BASE_DIGITS = 30
 #: Number of bits that store one decimal digit.
 _BITS_PER_DIGIT = math.log2(10.0)
@@ -42,9 +41,10 @@ _BITS_PER_DIGIT = math.log2(10.0)
 #: 15 digits: 50 + 5 = 55 bits
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _ADDITIONAL_BITS = 5
-#: Significant digits of a written decimal; 17 digits determine a double.
+#: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT_DIGITS = 17
-#: Digits of intermediate results in `format_decimal`.
+#: Number of digits of intermediate results in `format_decimal`.
+#: The decimal is then rounded to 17 digits.
 _CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _NEWTON_BITS = 30
