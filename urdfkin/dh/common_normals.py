@@ -8,9 +8,9 @@ A as a product:
 
 The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
 motion of the first joint, so phi and delta are parts of theta and d in the first joint's row. In the same
-way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes, beta is 0. The
-other six numbers of the product are then unique, except that x can have the opposite direction (Denavit and
-Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
+way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes, beta is 0, and
+x has two possible directions. For each direction, the other six numbers are unique (Denavit and Hartenberg).
+docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
 pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
@@ -40,7 +40,7 @@ from urdfkin.kinematics.roundings import (
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Below this tilt (rad), the common normal amplifies errors over 100 times.
+#: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
 #: Axes with a larger tilt (rad) never get a Hayati row.
@@ -293,9 +293,9 @@ def _choose_offset(
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # A later prismatic joint or the tool compensates for d.
-        # Rows i to end - 1 may contain a Hayati row.
-        # d then gives the Hayati row the reference table's a.
+        # Any d is possible, because a later prismatic joint or the tool compensates for d.
+        # One of the rows i to end - 1 may be a Hayati row.
+        # Then d is chosen so that the Hayati row and the reference table have the same cell a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -311,7 +311,10 @@ def _choose_offset(
 def _choose_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Choose phi to match theta of row i, or of the following prismatic joints."""
+    """Return the phi with which theta of row i equals the reference.
+
+    If prismatic joints follow, phi can match theta in the rows of these joints instead.
+    """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -384,10 +387,12 @@ class PoseTolerance:
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
     """Bound the rounding errors of a constant pose.
 
-    The pose is a product of `joints` joint origins.
-    `length` is the sum of the lengths of their translations (m).
-    `reach` is the length of the whole path (m).
     The bound covers angles rounded to fifteen digits.
+
+    Args:
+        joints: Number of joint origin transforms whose product is the pose.
+        length: Sum of the lengths of these transforms' translations, m.
+        reach: Length of the whole path, m.
 
     >>> tolerance = pose_tolerance(1, 0.1, 1.0)
     >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)

@@ -1,9 +1,11 @@
 """Convert a table to the other convention, to a kinematic tree, or to a URDF.
 
-`urdfkin.dh.table` defines the conventions and the factors X. The conversion to the modified convention moves
-the factor X_n of the last row into the tool. If the base has the form Tx(a) Rx(alpha), the first modified row
-contains this a and this alpha, and the base becomes the identity. The conversion to the standard convention
-does the opposite. Therefore, a conversion to the other convention and back gives the original table.
+`urdfkin.dh.table` defines the conventions and the factors X.
+
+| New convention | Multiplication | If base or tool has the form Tx(a) Rx(alpha) |
+|---|---|---|
+| modified | new tool = X_n . tool | the first row contains a and alpha of the base; new base = identity |
+| standard | new base = base . X_1 | the last row contains a and alpha of the tool; new tool = identity |
 
 In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis. This frame
 is frame i - 1 of a standard table, or frame i of a modified table.

@@ -213,10 +213,10 @@ def _shift(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
 
 
 def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
-    """Find frame 0.
+    """Rz(phi) Tz(delta) leads from frame 0 to joint 1.
 
     Returns:
-        T_base_0, and the angle about and offset along z_0 to joint 1.
+        T_base_0, phi (rad) and delta (m).
     """
     z, p = A[:3, 2], A[:3, 3]
     offset = clean_length(float(z @ p), reach, noise.metres)
@@ -224,10 +224,10 @@ def _find_frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple
     base[:3, 3] = p - offset * z
     if tilt_sine(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # Projection of the base's x axis e onto the plane normal to z: x = e - (e . z) z.
-    # The expression below has no cancellation if z is close to e.
+    # The projection of the base's x axis e onto the plane normal to z is x = e - (e . z) z.
+    # The expression below equals x, and has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    # If z_0 is nearly the base's x axis, x_0 is the projected y axis.
+    # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
@@ -255,8 +255,8 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", each row has its own link's offset.
-    # `_sum_offsets_in_first_row` then moves the sum to the first parallel axis.
+    # For parallel_offset="first", each row contains the offset of its own link here.
+    # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):

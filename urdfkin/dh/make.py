@@ -22,14 +22,14 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: Larger cell differences mean different robots.
+#: If the cells of two tables differ by more than this number, the tables describe different robots.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
 #: Tolerance of equal angles theta (rad) and rotation matrix entries.
 _ZERO_TOLERANCE = 1e-2
 #: Tolerance of equal cells (rad, or relative to the reach).
 _ROUNDING = 1e-12
-#: Options that the published table of `like` determines.
+#: These options follow from the published table if the argument `like` is given.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
 
 
@@ -118,13 +118,13 @@ def make_dh_table(
         base: A link or joint frame; None: the root.
         convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
         near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
-            four parameters, and offsets may be kilometres.
+            only four parameters; offsets of kilometres are possible.
         snap: Largest change (rad) of an angle that becomes a multiple of 15 degrees. The table's attribute
             `snap` reports the effect.
         last: "tip": the last row ends at the tip if possible. "flange": the tool leads from the last axis
             to the tip.
-        parallel_offset: Row with the offset d of consecutive parallel axes. "last": the last row has the
-            sum. "first": the first row has the sum. "each": each row has the offset of its link.
+        parallel_offset: Rows that contain the offsets d along consecutive parallel axes. "last": the last
+            row has the sum. "first": the first row has the sum. "each": each row has the offset of its link.
         flip: Joints whose positive direction is reversed (`sense` is -1).
         first: "base": d_1 and theta_1 lead to the first axis, if possible. "joint": the base leads to the
             first axis, and d_1 and theta_1 are 0 (Craig's frame 0).
@@ -132,7 +132,7 @@ def make_dh_table(
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
             The axis is shifted if this avoids a tool, a base translation or a distant common normal.
             "minimal": the axis passes through the origin of a neighbouring revolute joint, so a is 0. The
-            next joint has priority. Without such a joint, "drawn" applies.
+            next joint has priority. Without a revolute neighbour, "drawn" applies.
         like: A published table. The result copies joint directions, x axes and offsets d along parallel axes.
             The zeros of the first and last joints are copied too. All other numbers come from the URDF. The
             options `last`, `parallel_offset`, `flip`, `first` and `sign` must then have default values.
@@ -143,7 +143,7 @@ def make_dh_table(
         RangeError: the square of a length overflows.
     """
     exact = make_chain(tree, tip, base)
-    # Pinocchio computes poses from the root, so the whole path is checked.
+    # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]

@@ -35,7 +35,7 @@ from urdfkin.system.resources import robots_dir
 
 #: Tolerance of a rotation that is printed with six digits.
 _PRINTED_TOLERANCE = 1e-5
-#: Blank lines and Markdown fences may separate heading and rows.
+#: Blank lines and Markdown fences may separate the heading and the three rows of a printed pose.
 _POSE_LINES = 6
 #: A line such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
@@ -77,8 +77,8 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             break
     else:
         raise _missing_header_error(lines)
-    # For a robot named "robot", the table's title begins with "robot:".
-    # "robot: ur5" would otherwise be read as a setting.
+    # For a robot with the name "robot", the table's title begins with "robot:".
+    # Without this line, such a title would be read as a setting, for example "robot: ur5".
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
     if "convention" not in data and (convention := _find_convention(grid)):
@@ -221,7 +221,7 @@ def _split_csv_line(line: str, separator: str) -> list[str]:
 
 
 def _parse_aligned(lines: list[str]) -> _Grid | None:
-    """Parse cells separated by two or more blanks, otherwise by one."""
+    """Try two or more blanks between cells, then one blank."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]

@@ -139,8 +139,8 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles are usually multiples of 15 degrees.
-    Lengths are rarely multiples of 15 or of pi/12.
+    An angle is usually a multiple of 15 (degrees) or of pi/12 (radians).
+    A length is rarely such a multiple.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):

@@ -42,9 +42,10 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws and of M, for three numbers:
-#: difference of an axis vector's length from 1; pitch of a screw, m/rad;
-#: entries of R R^T - I, where R is the rotation in M.
+#: Tolerance of handwritten screws and of M.
+#: The length of an axis vector may differ from 1 by this number.
+#: The pitch (m/rad) of a screw may differ from 0 by this number.
+#: The entries of R R^T - I may differ from 0 by this number, where R is the rotation matrix in M.
 _HANDWRITTEN_TOLERANCE = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 

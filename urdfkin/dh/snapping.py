@@ -63,7 +63,7 @@ def snap_chain(
     """Return the chain with snapped angles.
 
     Returns:
-        The chain, and (k, change) for constant pose A_k.
+        The chain, and pairs (k, change): a change of the constant pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
@@ -89,7 +89,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # A prismatic axis may have been shifted to the previous origin.
+            # A prismatic axis may have been shifted to the origin of the previous joint.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_make_change(exact, pivot, what, angle), row=i))

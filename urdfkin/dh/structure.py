@@ -35,9 +35,9 @@ from urdfkin.model.configuration import axis_range, largest_value, sample_unifor
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
-#: Largest deviation of a reported property, rad and m.
+#: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
-#: Largest deviation of an exact property, rad and m.
+#: A property with at most this deviation (rad and m) counts as exact.
 EXACT_TOLERANCE = 1e-9
 #: Singular values below this number count as zero.
 #: Rounding errors of singular values are far below this number.
@@ -232,8 +232,8 @@ def _find_solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPai
         ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
         solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in names:
-        # ik-geo's solvers need parallel axes 2, 3 and 4.
-        # The suffix _two_intersecting also needs intersecting axes 5 and 6.
+        # ik-geo's solvers for three parallel axes require that axes 2, 3 and 4 are parallel.
+        # The solver with the suffix _two_intersecting also requires that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
         solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
@@ -282,7 +282,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     """Sample tip positions without mimic rules.
 
     Returns:
-        Positions, and the Jacobian of the first sample.
+        Tip positions at all samples, and the Jacobian at the first sample.
     """
     ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)

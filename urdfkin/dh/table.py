@@ -68,8 +68,8 @@ class DHRow:
     Attributes:
         a: Length along x; a_{i-1} in a modified table.
         alpha: Rotation about x; alpha_{i-1} in a modified table.
-        d: Offset along the joint's axis, without a prismatic joint's value.
-        theta: Rotation about the joint's axis, without a revolute joint's value.
+        d: Offset along the joint's axis, with the joint at zero.
+        theta: Rotation about the joint's axis, with the joint at zero.
         kind: Revolute, continuous or prismatic.
         joint: The joint's name.
         sense: +1, or -1 if the row subtracts the joint's value.
@@ -157,10 +157,10 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: Largest deviation of a rounded multiple of 15 degrees.
-#: The deviation is a fraction of 15 degrees.
+#: An angle in a table is treated as a rounded multiple of 15 degrees up to this deviation.
+#: The unit of the deviation is 15 degrees.
 _ROUND_TOLERANCE = 1e-3
-#: Tolerance of handwritten rotation matrices, often with seven digits.
+#: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6
 
 

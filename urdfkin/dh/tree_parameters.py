@@ -205,10 +205,11 @@ class _LinkAxis:
 
 
 def _find_link_axes(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frames; a fixed joint's link has its URDF frame."""
+    """Return each link's axis frame; for a fixed joint, the link's URDF frame."""
     links = list[_LinkAxis]()
-    # For each link: (i, T_i_link, number of fixed joints from link i).
-    # i is the moving link's own index, or the antecedent's index.
+    # The list has an entry for each link: (i, T_i_link, number of fixed joints from link i to the link).
+    # A moving link has its own index i.
+    # For all other links, i is the index of the antecedent.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -233,7 +234,7 @@ def _find_transforms(
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
-        # The first moving child defines the link's x axis.
+        # The first moving child of a link defines the link's x axis.
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))
@@ -243,7 +244,7 @@ def _find_transforms(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
-    # Without a moving child, x makes theta 0.
+    # For a link without a moving child, x is chosen so that theta is 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)

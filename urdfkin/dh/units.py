@@ -31,8 +31,8 @@ class LengthUnit(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: Order of the cells of a row that is a list.
-#: Craig's book: alpha, a, d, theta. Robotics Toolbox: theta, d, a, alpha.
+#: A row that is a list has its cells in this order.
+#: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
 _MAX_CELL_LENGTH = 200

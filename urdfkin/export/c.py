@@ -144,7 +144,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def count_reserved(code: FrameCode, function: Function) -> int:
-    """Return how many configurations give each array eight numbers.
+    """Return the least number of configurations for which every array has at least eight numbers.
 
     Arrays without numbers do not count.
     """

@@ -1,11 +1,11 @@
-"""Check the seal of an exported file, compile or import the file, and run the file's test vectors.
+"""Check the seal and the test vectors of an exported file.
 
 The seal is a line in the header with the digest of the file's text. The seal shows whether the header, the
 code or the test vectors were changed. A seal is not a signature, so it does not prove who wrote the file.
 
 The check runs the file as code. Check a file from another person only if you would run that person's
-programs. The check runs a copy in a separate folder. In the original folder, the file could import another
-file by accident, for example a `math.py`.
+programs. The check runs a copy of the file in a separate folder. In the original folder, the file could
+import another file by accident, for example a `math.py`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _COMPILE = {
 }
 #: Compiler and options for a CUDA file on a computer with a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of first characters that are searched for `EXPORT_MARK` and UNVERIFIED.
+#: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000
 #: Time limit of a command, s; a thousand joints compile in a minute.
 _TIME_LIMIT = 600.0

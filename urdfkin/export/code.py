@@ -261,6 +261,6 @@ def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) ->
         own, result = _SIGN, f"-{text(x.operands[0], _PRODUCT)}"
     else:
         own = _PRECEDENCE[x.op]
-        # Brackets keep the order of operations that Pinocchio confirmed.
+        # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
         result = f"{text(x.operands[0], own)} {x.op} {text(x.operands[1], own + 1)}"
     return result if own >= precedence else f"({result})"

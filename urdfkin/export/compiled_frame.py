@@ -44,7 +44,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default, GCC uses only half of the vector width on many processors.
+#: By default, GCC uses only half of the width of vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _load_counter = count()
@@ -140,9 +140,9 @@ def _load_code(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies libraries by their paths.
-        # A path contains a file descriptor, which later libraries can get again.
-        # The number of "./" makes all paths different.
+        # The loader identifies a library by the library's path, which contains the file descriptor.
+        # After the file is closed, a later library can get the same file descriptor.
+        # A different number of "./" for each library makes all paths different.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
 
@@ -164,7 +164,8 @@ def _processor_features() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results; eight configurations need half a megabyte of stack.
+#: Maximum number of results.
+#: The results of eight configurations then need at most half a megabyte of stack.
 _MAX_RESULTS = 8192
 # Plain integers are faster than members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -221,7 +222,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._machine_codes: dict[str, Callable[[int], int] | None] = {}
-        # The first call of each function compiles, or reads the cache.
+        # The first call of each function compiles the machine code, or reads the code from the cache.
         self._placement: FastFunction = partial(self._compute_first, "placement")
         self._velocity: FastFunction = partial(self._compute_first, "velocity")
         self._jacobian: FastFunction = partial(self._compute_first, "jacobian")
@@ -230,7 +231,7 @@ class CompiledFrame:
         self._acceleration: FastFunction = partial(self._compute_first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # Memory addresses are not valid in another process.
+        # Memory addresses are not valid in another process, so unpickling creates a new object.
         return self._robot.compile, (self.frame, self.reference)
 
     def placement(
@@ -339,7 +340,7 @@ class CompiledFrame:
         with compile_lock, import_lock:
             from urdfkin.compiled.machine.single import array_layout_is_known, wrap_c_function
 
-        # The fast function checks no quaternion norm and no result range.
+        # The fast function checks neither the norm of a quaternion nor the range of the results.
         needs_checks = self._tree.floating_joints or self._plan.is_large
         if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and array_layout_is_known()):
             return None
@@ -387,8 +388,8 @@ class CompiledFrame:
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If a number is not finite, the inputs are checked again.
-            # The message then names the coordinate.
+            # If a number is not finite, the code below checks the inputs again.
+            # The error message then names the coordinate of this number.
             with suppress(NotFiniteError):
                 self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -405,7 +406,7 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without conversion.
 
-        The conversion by `Call` takes a tenth of a large batch's time.
+        For a large batch, the conversion takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
@@ -433,7 +434,8 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # The code may write up to seven numbers beyond the results.
+            # The code writes eight numbers at once.
+            # Therefore, the code may write up to seven numbers beyond the results.
             # The buffer `stage` has space for these additional numbers.
             stage = (
                 aligned_empty(LANES * part[0].size + LANES) if row.has_columns and uses_buffer(out) else None

@@ -38,8 +38,8 @@ from urdfkin.verify.exact.numbers import (
 )
 from urdfkin.verify.verifier import Verifier
 
-#: Larger angles (rad) stay as they are.
-#: Below, neighbouring doubles are much closer than pi/12.
+#: Larger angles (rad) are never replaced by multiples of pi/12.
+#: Up to this angle, the distance between neighbouring doubles is far smaller than pi/12.
 _MAX_ANGLE = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT_ANGLES = ((0, 1), (1, 0), (0, -1), (-1, 0))

@@ -149,9 +149,9 @@ class Graph:
         return self.make_node("*", *_sort_operands(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Make an equation store its number in new nodes.
+        """Wrap an equation, so that each new node stores the equation's number.
 
-        Nested equations store the outer equation's number.
+        If an equation calls another equation, all nodes store the number of the first equation.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:

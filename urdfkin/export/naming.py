@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import sanitize
 
-#: Maximum length without prefix; MATLAB allows 63 characters.
+#: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix.
 _MAX_LENGTH = 40
 _MAX_COMMENT_LENGTH = 80
 

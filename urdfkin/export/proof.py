@@ -161,7 +161,7 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    # The user's certificate must not include these checks.
+    # A copy of the verifier makes the checks, because the user's certificate must not include these checks.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:
@@ -251,7 +251,8 @@ def _round_down(x: float) -> str:
 def _round_up(x: float) -> str:
     """Round a bound up.
 
-    The rounding error of a constant can be as large as the bound.
+    A smaller bound could reject a correct result.
+    For example, the rounding error of a constant can be equal to the bound.
     """
     return _round(x, 7, ROUND_CEILING)
 

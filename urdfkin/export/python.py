@@ -186,9 +186,9 @@ def _make_check(
 ) -> str:
     """Return code of the function `_demand`.
 
-    `wrong` and `is_array` are Python expressions. `wrong` is true for numbers of a wrong type. `is_array` is
-    true for an accepted container. An empty `is_array` accepts every container. `given` contains further
-    parameters of `_demand`.
+    `wrong` and `is_array` are Python expressions. `wrong` is true for numbers of a wrong type. `is_array`
+    tests whether the input `x` is an array. If `is_array` is empty, `_demand` omits this test. `given`
+    contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -402,7 +402,7 @@ DIALECTS = {
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
         first_lines=_make_length_check(_LENGTH_MESSAGE),
         result=_make_nested_result("Matrix([", "])"),
-        # SymPy simplifies slowly, so the check uses mpmath's numbers.
+        # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
         values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
         '    numbers |= {"Rational": lambda x, y: mpmath.mpf(x) / y, "Matrix": mpmath.matrix}\n'
         "    with mpmath.workdps(60):\n"

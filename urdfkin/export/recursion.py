@@ -10,7 +10,7 @@ motion about or along z.
 | other velocity, acceleration | each link's frame: joint axes are (0, 0, 1), link vectors are constant |
 
 For LOCAL_WORLD_ALIGNED, all rotations along the path are then applied to velocity and acceleration one after
-another. These rotations need a third fewer operations than the frame's rotation matrix R.
+another. These rotations need a third fewer operations than the computation of the rotation matrix R.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class NumberKind:
 
     Attributes:
         chapter: The textbook's equations.
-        begin_step: Called before each joint, the frame and the results.
-        end_step: Called after each joint and the frame.
-            Both functions receive the index of the step.
+        begin_step: Called with the step's index before each step.
+            The steps are the joints 0 to n - 1, the frame (n) and the results (n + 1).
+        end_step: Called with the step's index after the steps 0 to n.
     """
 
     chapter: Any
@@ -191,7 +191,7 @@ def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Refere
 
 
 def _recursion(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # WORLD needs the position p in world axes.
+    # The reference WORLD needs the position p, which is computed in world axes.
     return TreeRecursion(plan, kind, inputs, own_axes=not reference.at_world)
 
 

@@ -41,11 +41,13 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: A correction of cells is reported if it reduces the tip error
-#: to at most this fraction, or to `NEGLIGIBLE_ERROR` times the reach.
+#: A comparison reports the differing cells only if a correction of these cells reduces the tip error.
+#: The remaining tip error must be at most this fraction of the tip error without the correction.
+#: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _CORRECTED_FRACTION = 0.5
-#: If a table disagrees with the URDF, a corrected mistake must reduce
-#: the tip error to at most this fraction, or within the tolerance.
+#: If a table does not agree with the URDF, the search for a mistake in the table uses this number.
+#: The search accepts a correction that reduces the tip error to at most this fraction.
+#: The search also accepts a correction with a remaining tip error within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
 #: Suppose n cells differ without a fit, m cells after a fit.
@@ -68,8 +70,9 @@ def compare(
 ) -> TableComparison:
     """Compare a table with a path of a URDF.
 
-    Base and tip frames may differ by constant poses. `tolerance` (m) applies at the tip. With `fit`, base,
-    tool, joint offsets and signs are fitted first.
+    The table may have other base and tip frames than the path. The table's frames must be fixed to the
+    path's base and tip links. `tolerance` (m) applies at the tip. With `fit`, base, tool, joint offsets and
+    signs are fitted first.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -123,7 +126,7 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
-    """Return the largest tip errors (m, rad) after a fast fit.
+    """Return the largest tip errors (m, rad).
 
     The fit stops at a tip error of at most `target_error` (m).
     """
@@ -137,7 +140,7 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach, m.
 
     The path length can be far larger than the reach. For example, a URDF made from a table without Hayati
-    rows may contain kilometre offsets.
+    rows may contain offsets of kilometres.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -204,10 +207,9 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 
 
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
-    """Find the reference row of a standard cell.
+    """In a modified table, row i + 1 contains a, alpha and beta of standard row i.
 
-    In a modified table, row i + 1 contains a, alpha and beta of standard row i. The result is None if the
-    table has no such row.
+    The result is None if the table has no row i + 1.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
@@ -288,10 +290,7 @@ def _find_differences_without_fit(
     check_targets: TargetPoses,
     half_digits: HalfDigits,
 ) -> tuple[CellDifference, ...]:
-    """Find the cells to change instead of a fit.
-
-    The result is empty if a tip error remains.
-    """
+    """The result is empty if a tip error remains after changes of cells."""
     corrected = fit_cells(written, targets, _cell_mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > NEGLIGIBLE_ERROR * targets.scale or radians > NEGLIGIBLE_ERROR:

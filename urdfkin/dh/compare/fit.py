@@ -5,13 +5,12 @@
 | first | free parameters: base, tool and joint offsets |
 | second | free parameters, and as few cells as possible |
 
-A tip error and the tip's motion due to a small change are twists. Least squares finds changes whose twists
-cancel the error. Changes of different cells can often cancel the same error. The second fit therefore uses
-reweighted least squares, which change few cells.
+Least squares finds small changes that cancel the tip error. Changes of different cells can often cancel the
+same error. The second fit therefore uses reweighted least squares, which change few cells.
 
-Opposite offsets of nearly coinciding joints hardly move the tip. A fit therefore changes these offsets
-slowly. When the error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive
-joints by a large angle, and fits again.
+If two joint axes nearly coincide, opposite changes of the two joint offsets hardly move the tip. When the
+error no longer decreases, `fit_free_parameters` changes the offsets of two consecutive joints by a large
+angle, and fits again.
 """
 
 from __future__ import annotations
@@ -51,11 +50,12 @@ _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
 _MIN_WEIGHT = 1e-9
-#: Initial weight of the last cell; the first cell has 1.
-#: Of two cells with the same effect, only one then changes.
+#: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
+#: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_WEIGHT = 1.2
-#: Initial weight of cells in the column beta, and factor per reweighting.
-#: Both are below 1: beta changes only if alpha is not enough.
+#: The first number is the initial weight of every cell in the column beta.
+#: At each reweighting, the weights of the column beta are multiplied by the second number.
+#: Both numbers are below 1, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
@@ -63,11 +63,11 @@ _PATIENCE = 4
 _ROUNDING = 1e-13
 #: At or below this tip error (relative to the reach), the fit tries no further joint signs.
 _TIP_ROUNDING = 1e-12
-#: Other joint signs must reduce the tip error below this fraction.
+#: Other joint signs are accepted only if they reduce the smallest tip error so far below this fraction.
 _OTHER_START_ERROR = 0.5
 #: Opposite changes of the offsets of two consecutive joints, rad.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
-#: `count` and `beam_width` of a fast fit.
+#: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
 
 
@@ -127,9 +127,9 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path and the amounts (s, 5 n) of its motions.
+        """Return the path, and (s, 5 n) angles (rad) and lengths (m) along the path.
 
-        The amounts are in rad or m. `values` are (s, n) joint values.
+        `values` are (s, n) joint values.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variable_indices):
@@ -223,7 +223,7 @@ def apply_changes(
         new_cells[i, k] += offset * units[k]
     # The base's twist is in the frame of the first revolute joint.
     # The tool's twist is in the frame of the last revolute joint.
-    # Rotations about their z axes act like joint offsets.
+    # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
     base = _apply_twist(model.base @ model.T_0_first, free[:6], scale) @ np.linalg.inv(model.T_0_first)
     tool = np.linalg.inv(model.T_last_tip) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.T_last_tip
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -254,7 +254,7 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         by_cells = by_cells * mask.ravel()
         by_free = by_free if free else np.zeros_like(by_free)
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
-        # rcond prevents large opposite offsets of nearly coinciding axes.
+        # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _MAX_STEP * scale / max(float(np.abs(offsets).max()), MIN_DIVISOR))
         model = apply_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -271,7 +271,8 @@ def _sparse_changes(
 ) -> FloatArray:
     """Return changes of cells that remove the tip error.
 
-    As few cells as possible then differ from `start`. A cell that acts like a free parameter is not changed.
+    As few cells as possible then differ from `start`. A cell is not changed if changes of the free
+    parameters have the same effect on the tip.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
@@ -414,7 +415,7 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return models with large changes of two consecutive offsets.
+    """Change the offsets of two consecutive revolute joints by opposite angles.
 
     The two rotations cancel if the joints' axes coincide.
     """

@@ -4,7 +4,7 @@ An interpretation of a table consists of a convention, units and column names. E
 robot a different shape: distances, angles and offsets of consecutive axes. `find_better_interpretation` ranks
 the interpretations by a sum, and fits at most the three best:
 
-    difference between the shapes of table and URDF
+    sum of |shape of the table - shape of the URDF|
     + cost of each difference from the interpretation that the file states
 """
 
@@ -33,17 +33,17 @@ from urdfkin.model.tree import FloatArray
 _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
-#: Each difference from the stated interpretation has the same cost.
-#: Each interpretation gives a difference between the shapes of table and URDF.
-#: Cost: this fraction of the smallest difference, plus the tolerance (m).
+#: Cost (metres) of each difference from the interpretation that the file states:
+#: cost = _DIFFERENCE_COST * min(sum of |shape of the table - shape of the URDF|) + tolerance
+#: The minimum is over all interpretations.
 _DIFFERENCE_COST = 0.1
-#: Tip errors within the tolerance are always accepted.
-#: Larger tip errors must be at most this fraction of the reach,
-#: and of the tip error with the stated interpretation.
+#: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
+#: A larger tip error must be at most this fraction of the reach.
+#: A larger tip error must also be at most this fraction of the tip error with the stated interpretation.
 _BETTER_FRACTION = 0.05
-#: All other keys of a row are ignored, such as limits.
+#: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: Base and tool are fitted, so these keys are ignored.
+#: `find_better_interpretation` ignores these keys of a table, because the function fits base and tool.
 _IGNORED_KEYS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres).
 _MAX_LENGTH, _MIN_LENGTH = 20.0, 1e-3

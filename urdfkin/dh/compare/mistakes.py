@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
-correction of the sign, a fit changes fewer of these parameters.
+A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. A fit of the
+corrected table changes fewer parameters.
 """
 
 from __future__ import annotations
@@ -64,9 +64,7 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the likeliest mistakes.
-
-        After the likeliest corrections, a fit changes the fewest parameters. Allowed fits:
+        """Return the mistakes whose correction needs the fewest fitted parameters.
 
         | Arguments | Allowed fit of the corrected table |
         |---|---|

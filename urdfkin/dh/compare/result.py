@@ -20,15 +20,16 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: Corrected tip errors up to this number count as zero.
+#: After a correction of cells, a tip error up to this number is treated as zero.
 #: The unit is rad, or metres per metre of reach.
-#: Rounding errors of a fit are much smaller.
-#: Rounding errors in data sheets are much larger.
+#: The rounding errors of a fit are far below this number.
+#: The rounding errors of numbers in data sheets are far above this number.
 NEGLIGIBLE_ERROR = 1e-9
-#: Smallest tip error in `fit_resolution` (rad, or metres per metre of reach).
+#: Smallest tip error that `fit_resolution` uses (rad, or metres per metre of reach).
+#: A tip error below this number is replaced by this number.
 _MIN_TIP_ERROR = 1e-12
-#: Factor for half a unit of a cell's last digit.
-#: Doubles cannot represent most decimal numbers exactly.
+#: Half a unit of a cell's last digit is multiplied by this factor.
+#: The factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF_DIGIT_FACTOR = 1.0 + 1e-6
 
 
@@ -41,7 +42,7 @@ class CellDifference:
     Attributes:
         tip_displacement: Largest tip displacement on samples due to this cell, m.
         half_digit: Half a unit of the last digit of `reference`.
-            0 if the value is exact or its text is unknown.
+            0 if the value is exact or the cell's text is unknown.
     """
 
     row: int
@@ -141,9 +142,9 @@ class TableComparison:
             They hold for all angles, and displacements within the limits.
             A prismatic joint without limits stays within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
-        unfitted_differences: Cells to change instead of a fit.
-            Empty without a fit, or after a found mistake.
-            Empty if few changes are not enough.
+        unfitted_differences: Cells that must change so that the unfitted table agrees.
+            Empty if `is_fitted` is false, or if `mistakes` is not empty.
+            Empty if a tip error remains, or if more than len(differences) + 2 cells must change.
         hidden: Row index and name of each hidden cell.
             A fit compensates errors of hidden cells.
         residual: Tip error after cell corrections, m.

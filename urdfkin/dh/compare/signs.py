@@ -34,10 +34,10 @@ from urdfkin.model.tree import FloatArray
 
 MAX_PATTERNS = 12
 BEAM_WIDTH = 128
-#: Cost (metres) of each joint with sign -1.
-#: Among equal alignments, the URDF's joint signs are preferred.
+#: A joint with sign -1 adds this number (metres) to the cost of an alignment.
+#: If several alignments fit equally well, the alignment with the URDF's joint signs is therefore preferred.
 _REVERSAL_COST = 1e-9
-#: Weight of length differences next to a prismatic axis, which can be shifted.
+#: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _PRISMATIC_WEIGHT = 1e-3
 #: Axes closer than this distance (m) count as coinciding.
 #: The axis x can then have any direction.
@@ -74,8 +74,8 @@ class _PartialAlignment:
         offsets: Joint offsets without the last.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
         delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
-        free_offset: Row of a joint offset that can be chosen freely, and a sign.
-            The sign is the rotation direction of x if the offset increases.
+        free_offset: (row index, sign) of a joint offset that can be chosen freely.
+            If the offset increases, x rotates in the direction of the sign.
     """
 
     cost: float
@@ -106,9 +106,9 @@ def find_sign_fits(
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _drop_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam_width]
-    # Nearly coinciding axes have many equivalent directions of x.
-    # One start value is enough, because the fit can rotate x.
-    # Only the best alignment of each sign combination is kept.
+    # If axes nearly coincide, many directions of x are nearly equivalent.
+    # One start value is enough for all these directions, because the fit can rotate x.
+    # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -143,7 +143,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Extend an alignment by joint i + 1, once for each transform."""
+    """Return alignments that also contain joint i + 1."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
@@ -213,8 +213,9 @@ def _possible_transforms(
         # Next to a prismatic joint, any direction of x is possible.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
-        # With reach 0, a common normal is distant if it misses an origin.
+        # For a tilt above `NEARLY_PARALLEL`, `find_axis_transform` gives a Hayati row
+        # only if the common normal is farther away than `hayati_reach`.
+        # With reach 0, this is true if the common normal misses one of the two origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
 _TEXT = "urdfkin.dh.export.text"
-#: Module with `write_NAME`, and description of each format NAME.
-#: "" means a module of the package `urdfkin.export`.
+#: For each format NAME: the module that contains the function `write_NAME`, and a description.
+#: The module name is "" if a module of the package `urdfkin.export` contains this function.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),
     "markdown": (_TEXT, "a Markdown table"),

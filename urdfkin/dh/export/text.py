@@ -30,8 +30,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Factor on a bound before its last digit is rounded up.
-#: A tiny rounding error must not increase the last digit.
+#: A bound is multiplied by this factor before the last printed digit is rounded up.
+#: Without the factor, a tiny rounding error of the bound could increase the last digit by 1.
 _ROUND_UP_FACTOR = 1.0 - 1e-12
 
 
@@ -57,7 +57,7 @@ def format_variable(
 def format_coordinate_names(table: DHTable) -> str:
     """Return text such as "with q1 = left".
 
-    The text is empty if each q_i is the joint of row i.
+    The text is empty if q1 is the joint of row 1, q2 is the joint of row 2, and so on.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
