@@ -293,7 +293,7 @@ FORGED: dict[str, Any] = {
     "or the reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
     "or the reason why": lambda d: d.update(
         checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)),
-    "or the reason why Pinocchio confirmed no bounds": lambda d: d.update(checked=confirmed(by="")),
+    "or the reason why Pinocchio did not confirm the bounds": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "the order joint_2, joint_1 is not possible": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }  # fmt: skip

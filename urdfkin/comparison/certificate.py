@@ -184,8 +184,8 @@ class SameCertificate(Header):
     tools: Annotated[
         list[ToolEntry],
         doc(
-            "Pairs of matched links with different poses on the same rigid body. `same` reports the links of"
-            " a pair as different tools."
+            "Pairs of matched links with different poses on matching rigid bodies. `same` reports the links"
+            " of a pair as different tools."
         ),
     ]
     orders: Annotated[
@@ -366,7 +366,7 @@ def _confirmation_errors(
     if state != "confirmed" or reason or claimed["configurations"] != CONFIRMATION_SAMPLES or not known:
         yield (
             f"`checked`: the entry must contain a confirmation at {CONFIRMATION_SAMPLES} configurations,"
-            " or the reason why Pinocchio confirmed no bounds"
+            " or the reason why Pinocchio did not confirm the bounds"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))

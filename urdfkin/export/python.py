@@ -296,7 +296,7 @@ DIALECTS = {
     ),
     "array": Dialect(
         about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and\n"
-        "device, whose batch axes broadcast. PyTorch's tensors need the package array-api-compat. No array\n"
+        "device. Batch axes are broadcast. PyTorch's tensors need the package array-api-compat. No array\n"
         "is changed in place. check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
         imports="import numpy",
         helpers=_NAMESPACE
