@@ -76,7 +76,7 @@ LIMITS = {
     "--max-name": (DEFAULT_SIZE_LIMITS.name, "characters of a name"),
     "--max-number": (DEFAULT_SIZE_LIMITS.number, "characters of a number"),
     "--max-markup": (DEFAULT_SIZE_LIMITS.markup, "bytes of one tag or comment"),
-    "": (MAX_COMPLETE_FINDINGS, "complete findings with one code and severity, in all output formats"),
+    "": (MAX_COMPLETE_FINDINGS, "complete findings for each code and severity, in all output formats"),
 }
 
 

@@ -6,9 +6,9 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
 The script first runs the quick tests in the files that mention the mutated module, and in the files for the
-module's package. If no test fails, --slow runs the slow tests in these files. If no slow test fails either,
---whole runs all quick tests. The script prints every undetected mutant, and skips the mutants that
-docs/mutation.md lists as harmless.
+module's package. If no quick test fails, --slow runs the slow tests in these files. If no slow test fails,
+--whole runs the quick tests in all files. The script prints every undetected mutant. The script skips the
+mutants that docs/mutation.md lists as harmless.
 
 A named mutant is a mistake that no test detected in the past. A named mutant replaces code of one function.
 Each entry of tests/attacks/named_mutants.toml names the test that must fail for the mutant.

@@ -1,1 +1,1 @@
-"""Programs that run tables exported as code."""
+"""Programs that run Denavit-Hartenberg tables, which were exported as code."""

@@ -76,7 +76,7 @@ class _RandomModel:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        for _ in range(rng.randint(1, 2)):  # Rotated boxes give the body oblique axes of inertia.
+        for _ in range(rng.randint(1, 2)):  # For a rotated box, the axes of inertia are oblique.
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:

@@ -339,7 +339,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text()
         ({"joints": ["elbow"]}, "unknown coordinate 'elbow'"),
         ({"joints": "panda_joint1"}, "must be a list of names"),
         ({"joints": ["panda_joint1"]}, "give a value within them: lock={'panda_joint4': VALUE}"),
-        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also in the list joints"),
+        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also in `joints`"),
         ({"joints": ["panda_finger_joint2"]}, "this joint mimics panda_finger_joint1"),
     ],
 )

@@ -70,8 +70,8 @@ _POORLY_OBSERVABLE_RATIO = 10.0
 _RANDOM_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _RANK_TOLERANCE = 1e-12
-#: Assumed position of a fitted target in the tip's frame, if no poses are given: (L/5, L/6, L/7).
-#: L is `ParametricChain.characteristic_length` (m).
+#: If the tool is fitted and no poses are given, the target is assumed to be at (L/5, L/6, L/7).
+#: These coordinates are in the tip's frame, and L is `ParametricChain.characteristic_length` (m).
 #: A target at this position hardly ever lies on a joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding_bound` for the comparison with Pinocchio.
@@ -154,7 +154,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """(p,) changes in the written file, m and rad."""
+        """Changes (p,) of the parameters in the written file, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property

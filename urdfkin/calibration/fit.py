@@ -94,7 +94,8 @@ _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
+#: The text "same effect as ..." omits some fitted parameters.
+#: An omitted parameter contributes at most this fraction of the effect.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -212,7 +213,8 @@ def join_names(names: Iterable[str], limit: int) -> str:
 
 
 #: A fit can be checked if its total redundancy is at least this number.
-#: Without rounding errors, the total redundancy is an integer: 0, 1, 2, ...
+#: Without rounding errors, the total redundancy is an integer.
+#: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
 _MIN_REDUNDANCY = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue count as zero.
 #: For an eigenvalue of zero, the fit adapts completely to a measurement error along the eigenvector.

@@ -141,7 +141,7 @@ class ParametricChain:
         parameter_values: FloatArray | None = None,
         frames: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return tip poses and their Jacobian by the parameters.
+        """Return tip poses, and their derivatives with respect to the parameters.
 
         `frames` is `self.frames(joint_values, parameter_values)`, if already computed.
 
@@ -349,7 +349,7 @@ class _ModelBuilder:
         preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Base and tool come before the joints, because their values are unknown before the fit.
+        # Base and tool have the highest preference, because their values are unknown before the fit.
         # The parameters of the joints are nearly known before the fit.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]

@@ -87,8 +87,9 @@ choice_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "Rule for the rows of consecutive parallel axes. last or first: the cell d of the last or first of"
-        " these rows contains the sum of the offsets. each: each cell d contains the offset of its own link.",
+        "Rule for the rows of consecutive parallel axes. last: the last of these rows contains the sum of"
+        " the offsets d. first: the first row contains the sum. each: each row contains the offset of its"
+        " own link.",
     ),
     click.option(
         "--flip",

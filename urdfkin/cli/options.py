@@ -211,7 +211,7 @@ robot_options = combine(
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
         " With --joints, the first --lock may be the name of a pose, such as ready. A fixed joint"
-        " without a value of its own is then fixed as in this pose, not at 0.",
+        " without a given value then has the value in this pose instead of 0.",
     ),
     click.option(
         "--joints",

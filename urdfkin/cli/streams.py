@@ -120,7 +120,7 @@ def _show_warning(
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
 #: Maximum number of stored characters of an unfinished line.
 #: A longer line is stored only in part.
-#: The next text may complete a CI command in this line.
+#: The line is needed because a CI command may be written in several pieces.
 _MAX_STORED = 64
 
 

@@ -142,8 +142,7 @@ PANELS = (
     "--to",
     "end",
     metavar="VALUES",
-    help="Plot a straight line in joint space that ends at this configuration, in the format of --q of other"
-    " commands.",
+    help="End of a straight line in joint space, which is plotted; the format is the same as for --q.",
 )
 @click.option(
     "--duration",

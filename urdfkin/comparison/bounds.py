@@ -49,15 +49,16 @@ RANDOM_SAMPLES = 512
 #: Number of random configurations at corners of the joint ranges.
 #: At a corner, each variable is equal to the lower or the upper end of its range.
 CORNER_SAMPLES = 128
-#: Number of sampled configurations per frame at which the search starts.
+#: Number of sampled configurations from which the search starts for each frame.
+#: The search looks for the largest distance.
 STARTING_POINTS = 4
 #: Number of values that one step of the search tries for one coordinate.
 VALUES_PER_STEP = 13
 FRAMES_PER_BATCH = 24
-#: Width of the search interval in each round, relative to the coordinate's range.
+#: Width of the search interval in each round, as a fraction of the coordinate's range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
-#: Function that returns the poses (n, frames, 4, 4) at q.
+#: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
 PoseFunction = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
@@ -88,8 +89,8 @@ class DistanceSearch:
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: True if `as_written`, and a moving joint lies between A's or B's root and base link.
-        #: Then the bounds of `upper_bounds` and `tighten` do not hold.
+        #: Whether a moving joint between a robot's root and its base link changes the distances.
+        #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -307,7 +308,7 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
 #: Maximum number of boxes in memory.
 #: With this number of boxes, `tighten` takes one or two seconds per frame.
 MAX_BOXES = 2**17
-#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes.
+#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BOXES_PER_BATCH = 2**16
 
 

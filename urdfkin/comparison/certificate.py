@@ -32,10 +32,11 @@ from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Maximum number of boxes in memory during `recheck`.
 MAX_RECHECK_BOXES = 2**22
-#: Relative tolerance of a certificate's numbers, and absolute tolerance near zero (m or rad).
-#: The machine that wrote the certificate may have other rounding errors.
+#: Relative tolerance of the numbers in a certificate.
+#: For numbers near zero, the tolerance is absolute (m or rad).
+#: The tolerances allow for different rounding errors on the machine that wrote the certificate.
 _RELATIVE_TOLERANCE, _ZERO_TOLERANCE = 1e-9, 1e-15
-#: Relative tolerance of a bound, in machine epsilons.
+#: The relative tolerance of a bound is this number times the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: `recheck` computes these entries again, and compares the results with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")

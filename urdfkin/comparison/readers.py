@@ -27,14 +27,14 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Tolerance of pose entries, relative to max(1, largest entry).
-#: Double precision causes differences below 1e-13.
+#: Tolerance for the entries of poses, relative to max(1, largest entry).
+#: Libraries that compute in double precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
 #: Tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
-#: Time limit for one library's process, s.
+#: Time limit for the process of one library, in seconds.
 _TIMEOUT = 60.0
-#: Maximum output of a library's process, bytes.
+#: Maximum number of bytes that a library's process may return.
 _MAX_BYTES = 400_000_000
 #: Maximum length of a library's error message, in characters.
 _MAX_CHARACTERS = 200
@@ -160,7 +160,7 @@ def _compare_reader(
         )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
     # `load` may add a root joint that the text does not contain.
-    # Poses are therefore relative to the first common link.
+    # Therefore, the compared poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())

@@ -37,7 +37,7 @@ from urdfkin.system.lazy_import import get_hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: Values from 0.9 m or 0.9 rad have no unit prefix.
+#: Values of at least 0.9 m or 0.9 rad have no unit prefix.
 #: Smaller values have the largest unit prefix that makes the number at least 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
 #: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
@@ -56,7 +56,7 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes. If such changes make B equal to A, the models are equivalent.
+#: The models are equivalent if changes of these kinds make B equal to A.
 #: The printed verdict lists the kinds in this order.
 EQUIVALENCE_KINDS = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between matching frames has an upper bound.
@@ -105,11 +105,11 @@ class Interval:
 
 
 #: Value of a parameter of a joint or link.
-#: str: type or name. float: limit of velocity or effort.
-#: tuple for "limits": lower and upper limit.
-#: tuple for "idle": type and constant value (rad or m) of a joint that never moves.
-#: tuple for "only in A" and "only in B": names of links.
-#: `Mimic`: mimic rule. None: no value.
+#: A str is a type or a name, and a float is a limit of velocity or effort.
+#: For "limits", a tuple contains the lower and the upper limit.
+#: For "idle", a tuple contains the type of a joint that never moves, and the joint's value (rad or m).
+#: For "only in A" and "only in B", a tuple contains the names of links.
+#: A `Mimic` is a mimic rule; None means that the parameter has no value.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -258,7 +258,7 @@ class Tool:
 
 #: Result of Pinocchio's check of the bounds.
 #: "not asked" means that the user requested no check.
-#: "not verified": Pinocchio could not check the bounds.
+#: "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
@@ -698,7 +698,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
-                continue  # The change "base" already describes this difference.
+                continue  # The line about the base pose already describes this difference.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -774,7 +774,7 @@ def _remove_rounding(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    # `same` can replace a mimic joint with the multiplier 0 by a fixed joint.
+    # `same` may treat a mimic joint as a fixed joint, if the multiplier is 0.
     # The child link of this fixed joint is not treated as a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or is_idle(tree.joints[link - 1]):

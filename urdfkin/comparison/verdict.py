@@ -59,7 +59,7 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
 
-#: Number of random configurations at which Pinocchio checks distances.
+#: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMATION_SAMPLES = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE_GRID`.
 #: The search for the largest distance between the unchanged models uses at most this number of frames.
@@ -523,10 +523,9 @@ def _swap_pairs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def _iterate_travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
-    """Yield translating joints and their travels.
+    """Yield each translating joint and the travel of the joint, m.
 
-    Yields:
-        A joint, and its travel, m; inf without limits.
+    The travel of a joint without limits is infinite.
     """
     for step, pair in zip(alignment.steps, variables.pairs, strict=True):
         if step.kind in ("planar", "floating"):
@@ -811,8 +810,8 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A shifted link origin also shifts the axis in the frame of P.
-            # Therefore, the axes are then compared in the link's frame.
+            # A shifted link origin also shifts the axis.
+            # Therefore, the axes are compared in the link's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
                 axis = list(

@@ -354,12 +354,11 @@ ANGLE_WIDTH = 4
 #: Rows from 19: all other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, AXIS_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers per Jacobian column, in a program for a Hessian:
+#: Number of integers per Jacobian column, if a program computes a Hessian:
 #: 0: first scratch row of the column,
 #: 1: the joint's row in `steps`,
 #: 2: the joint's index in v,
-#: 3: first scratch row of six sums of derivatives
-#: with respect to the joint's motion.
+#: 3: first scratch row of six sums of derivatives with respect to the joint's motion.
 HESSIAN_COLUMN_WIDTH = 4
 
 _JOINTS = {

@@ -1,6 +1,7 @@
 """Fast results of one frame for one configuration, for control loops and solvers.
 
-If another thread is using a function's scratch memory, `Robot` computes the same result instead.
+Each fast function has scratch memory for one thread. If two threads call the function at the same time, the
+methods of `Robot` compute the result of the second call.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ from urdfkin.model.tree import FloatArray, Joint
 #: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
-#: Axes with a larger tilt (rad) never get a Hayati row.
+#: Axes with a tilt (rad) above this limit never get a Hayati row, even if their common normal is far away.
 MAX_HAYATI_TILT = 0.35
 
 
@@ -347,7 +347,7 @@ def match_theta(theta: float, reference: float) -> float:
     )
 
 
-#: Longest permitted length, m; squares of longer lengths may overflow.
+#: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
 MAX_LENGTH = 1e150
 
 

@@ -41,7 +41,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, ENTRY_ROUNDINGS, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance of a right angle, rad; 1.571 counts as a right angle.
+#: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_TOLERANCE = 1e-3
 
 _OPTIONS = {

@@ -25,9 +25,9 @@ from urdfkin.model.tree import KinematicTree
 #: If the cells of two tables differ by more than this number, the tables describe different robots.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
-#: Tolerance of equal angles theta (rad) and rotation matrix entries.
+#: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _ZERO_TOLERANCE = 1e-2
-#: Tolerance of equal cells (rad, or relative to the reach).
+#: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
 #: These options follow from the published table if the argument `like` is given.
 _SET_BY_LIKE = ("last", "parallel_offset", "flip", "first", "sign")
@@ -47,8 +47,9 @@ def find_reversed_joints(
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
-    # Base and tool compensate for reversed first and last joints.
-    # Both signs of both joints are therefore tried.
+    # The base can compensate for a reversed first joint.
+    # The tool can compensate for a reversed last joint.
+    # Therefore, both signs of these two joints are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -74,7 +75,7 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
         theta = abs(angle_difference(row.theta, other.theta))
-        # The tool compensates for a and alpha in the last row.
+        # The tool transform compensates for differences of a and alpha in the last row.
         if i < n - 1:
             is_unique = row.kind.turns and table.rows[i + 1].kind.turns
             unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)

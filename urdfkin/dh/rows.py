@@ -57,7 +57,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys with information that does not change the table.
+#: These keys contain information about a table, and do not change the table.
 _NOTE_KEYS = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked", "lock")
 _MAPPING_REMEDY = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 

@@ -41,9 +41,9 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, free
 #: Above 7.5 degrees, an angle could become either of two multiples of 15 degrees.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
-#: Assumed range of mimicked joints outside the path, rad or metres.
+#: Assumed range (rad or metres) of a mimicked joint that is not on the path.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest deviation in `find_noisy_cells` (rad, or relative to the span).
+#: `find_noisy_cells` returns cells with a deviation up to this number (rad, or relative to the table's span).
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -156,7 +156,8 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Snap the angles of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # Gimbal lock determines only roll + yaw or roll - yaw, so roll is 0.
+    # In gimbal lock, only roll + yaw or roll - yaw is defined.
+    # Therefore, roll is set to 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:

@@ -158,7 +158,7 @@ class DHRow:
 
 
 #: An angle in a table is treated as a rounded multiple of 15 degrees up to this deviation.
-#: The unit of the deviation is 15 degrees.
+#: The deviation is a fraction of 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6

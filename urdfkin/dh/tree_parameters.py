@@ -315,7 +315,7 @@ def tree_document(table: TreeParameters, units: Units) -> TextDocument:
 
 def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     theta, r = units.format_angle(row.theta), units.format_length(row.r)
-    # The constant includes the offset of the mimic rule.
+    # The constant in a mimic joint's cell includes the offset of the mimic rule.
     variable = (
         f"q({row.mimicked_joint})"
         if row.mimicked_joint == row.joint

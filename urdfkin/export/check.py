@@ -42,7 +42,8 @@ _COMPILE = {
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000
-#: Time limit of a command, s; a thousand joints compile in a minute.
+#: Time limit of a compiler or a test program, s.
+#: The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 

@@ -351,7 +351,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # Later calls do not warn, to save time.
+            warn_of_degrees(self._tree, q)  # Later calls do not warn, because the check takes time.
         return found
 
     def _machine_code(self, row: Quantity) -> Any:

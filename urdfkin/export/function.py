@@ -159,7 +159,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "cos": np.cos,
     "sqrt": np.sqrt,
 }
-#: Derivatives of an operation with respect to its operands.
+#: Derivatives of an operation's value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),

@@ -45,8 +45,8 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import compute_motion
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations that Pinocchio checks.
-#: Pinocchio also checks the neutral configuration and the limits.
+#: Number of random configurations at which Pinocchio checks the results.
+#: Pinocchio also checks the results at the neutral configuration and the joint limits.
 PROOF_SAMPLES = 100
 VECTOR_COUNT = 4
 

@@ -201,7 +201,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
         case Reference.LOCAL | Reference.WORLD:
-            pass  # Both vectors already refer to the axes of the reference frame.
+            pass  # The components of both vectors already refer to the axes of the reference frame.
         case _:
             assert_never(reference)
     return [*linear, *angular]

@@ -44,7 +44,7 @@ array_equations = bind_equations(
     product=np.matmul,
 )
 
-#: A float, or an array with one length for each configuration.
+#: The length of a vector: a float, or an array with a number for each configuration.
 Length = Any
 
 

@@ -294,7 +294,7 @@ def integrate_orientation(
 ) -> FloatArray:
     """Integrate 7.57 by the fourth-order Runge-Kutta method.
 
-    `quat` is the orientation at the first of the increasing `times`, in s.
+    `quat` is the orientation at the first time. The `times` (s) increase.
     A jump of `w` must be at one of the `times`.
     No step evaluates `w` at one of the `times`.
     """

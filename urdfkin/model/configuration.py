@@ -343,9 +343,7 @@ def parse_locks(
     if joints is not None:
         layout.check_names(joints, "joints")
         if repeated := sorted(locked_names.intersection(joints)):
-            raise InputError(
-                "a joint to lock is also in the list joints", where="lock", found=join_names(repeated)
-            )
+            raise InputError("a joint to lock is also in `joints`", where="lock", found=join_names(repeated))
         locked_names |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or use joints (--joints) to list the joints that remain movable"

@@ -1,4 +1,4 @@
-"""The summary of a robot: a table of its joints with axes, indices and limits, printed as a tree."""
+"""The summary of a robot: the tree of its links and joints, with columns for axes, indices and limits."""
 
 from __future__ import annotations
 

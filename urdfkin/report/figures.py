@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Left end of the x axis, in eps * scale.
-#: A percentage there states the share of smaller disagreements.
+#: A percentage at this end states the share of disagreements below this number.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82

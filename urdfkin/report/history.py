@@ -113,7 +113,7 @@ class HistoryDocument(Header):
     runs: Annotated[list[ValidationRun], doc("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], doc("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], doc("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], doc("Files that contain the same validation run as another file.")]
+    repeated: Annotated[list[Unused], doc("Files whose validation run is already in another file.")]
 
 
 HISTORY = DocumentKind(
@@ -175,7 +175,7 @@ def read_history(paths: Sequence[Path]) -> History:
         raise InputError(
             "no report to show",
             where=", ".join(shorten_path(path) for path in paths[:3]),
-            found=some or "no .json file and no folder of `validate --store`",
+            found=some or "neither .json files nor a folder of `validate --store`",
             remedy=f"write one with: {VALIDATION.command}",
         )
 

@@ -1690,7 +1690,7 @@ class Robot(Displayable):
         # A plain str with the default reference is its own key.
         # Such a key needs no slow hash of an enumeration member.
         # Every other key contains the class of `frame`, for example `LinkFrame`.
-        # `LinkFrame("link:a")` equals "link:a", but can name a different frame.
+        # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared

@@ -37,7 +37,7 @@ def _needs_version_1_2(joint: Joint) -> bool:
     if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # Without position limits, infinite effort and velocity need no <limit> element.
+    # A joint without position limits and without finite other limits needs no <limit> element.
     return any(infinite) and (joint.kind.has_limits or not all(infinite))
 
 

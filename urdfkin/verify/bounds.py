@@ -439,7 +439,7 @@ def placement_scale(plan: CompiledTree, magnitudes: Magnitudes) -> FloatArray:
 
 @_allow_overflow
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
-    """Return the bound on placements from an MJCF file.
+    """Bound the errors of placements from an MJCF file.
 
     | Lengths | |
     |---|---|
@@ -558,13 +558,13 @@ def jacobian_rate_scale(plan: CompiledTree, magnitudes: Magnitudes, reference: R
     return _repeat_as_six_rows(linear, angular)
 
 
-#: Numbers of cross products in the linear rows of Pinocchio's Hessian.
-#: A Hessian entry is the derivative of a Jacobian column.
-#: Column i is differentiated with respect to the coordinate of joint j.
+#: Count of cross products in the linear rows of Pinocchio's Hessian, dJ_i/dq_j.
 #: The joints on the path are numbered from the root.
-#: Each reference frame has two pairs of numbers: one pair for j <= i, and one pair for j > i.
-#: The first of the two numbers counts the products z x (z x d), which occur for two revolute joints.
-#: The second number counts the products z x z, which occur for a revolute and a prismatic joint.
+#:
+#: | | Two revolute joints, z x (z x d) | A revolute and a prismatic joint, z x z |
+#: |---|---|---|
+#: | j <= i | first pair, first number | first pair, second number |
+#: | j > i | second pair, first number | second pair, second number |
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -650,7 +650,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
         additional joint in k: at least 24 eps (`PINOCCHIO_ROUNDINGS`) > 13 eps
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # Here s is the sine minus its rounding error. If s is not positive, the scale becomes infinite.
+    # s is now a lower bound on the sine. If s is not positive, the scale becomes infinite.
     # The comparison accepts no result with an infinite scale.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()

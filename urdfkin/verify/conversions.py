@@ -13,8 +13,8 @@
 cannot check the robot.
 
 For a table or a `pinocchio.Model`, urdfkin writes a URDF text. Both programs compute from this text, so a
-comparison of their results finds no error in the text. `check_table_source` and `check_model_source` find
-such an error.
+comparison of their results cannot find an error in the text. `check_table_source` and `check_model_source`
+find such an error.
 """
 
 from __future__ import annotations

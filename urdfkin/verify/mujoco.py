@@ -14,8 +14,8 @@ module changes the text before MuJoCo reads it:
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
-floating or planar joint, v is in the axes of the child link, but the slide joints are fixed in the parent
-link. S therefore also contains the rotation from the child's axes to the parent's axes.
+floating or planar joint, urdfkin's v is in the axes of the child link, but MuJoCo's qvel is in the axes of
+the parent link. S therefore also contains the rotation from the child's axes to the parent's axes.
 """
 
 from __future__ import annotations

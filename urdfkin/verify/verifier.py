@@ -402,8 +402,7 @@ def compute_oracle_results_with_bound(
 def compute_bound(quantity: Quantity, x: CallPart, library: OracleLibrary = PINOCCHIO) -> Bound:
     """Bound the differences between urdfkin and an oracle.
 
-    If the base is fixed and all joints are revolute, path lengths are constant.
-    The bound of a placement or a Jacobian is then constant too.
+    With a fixed base and revolute joints, the bound of a placement or a Jacobian is constant.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is FIXED_BASE_STATE and x.plan.all_revolute and len(x.q) > 0

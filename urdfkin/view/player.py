@@ -143,7 +143,7 @@ class Player:
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
     """Request a picture up to five times, until the picture differs from `last`.
 
-    A busy browser can draw the previous pose again.
+    A busy browser may return the picture of the previous pose.
     """
     for _ in range(5):
         picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)

@@ -374,7 +374,7 @@ def stream(x, count, to, at, address):
 
 @intrinsic
 def wait_for_writes(context: Any) -> Any:
-    """Make streamed numbers visible to other processors."""
+    """Wait until other processors can read all written numbers."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         builder.fence("seq_cst")

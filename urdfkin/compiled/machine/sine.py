@@ -102,8 +102,8 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
         # An odd number of quarter turns exchanges sine and cosine.
-        # The sine changes its sign after 2 or 3 quarter turns (modulo 4).
-        # The cosine changes its sign after 1 or 2 quarter turns (modulo 4).
+        # Let k be the number of quarter turns modulo 4.
+        # The sine changes its sign if k is 2 or 3, and the cosine if k is 1 or 2.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             apply_sign(builder.select(odd, cosine, sine), quarters),

@@ -37,7 +37,7 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
-#: Default tolerance, m: covers one or two cells rounded to 0.1 mm.
+#: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
 TIP_TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
@@ -50,8 +50,8 @@ _CORRECTED_FRACTION = 0.5
 #: The search also accepts a correction with a remaining tip error within the tolerance.
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Suppose n cells differ without a fit, m cells after a fit.
-#: The n cells are reported if n - m is at most this number.
+#: Suppose that n cells differ without a fit, and m cells differ after a fit.
+#: The n cells are reported only if n - m is at most this number.
 _MAX_MORE_CELLS = 2
 #: The reach is computed from the positions of the tip.
 #: If the tip moves at most this fraction of the path length, the path length replaces the reach.

@@ -41,11 +41,11 @@ _MOTIONS = {
 }
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
-#: Maximum change of a parameter per step (rad, or fraction of the reach).
+#: Maximum change of a parameter in one step of the fit (rad, or a fraction of the reach).
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: Mean error at which the fit of cells ends, relative to the reach.
+#: The fit ends at this mean error, relative to the reach.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -59,13 +59,13 @@ _LAST_WEIGHT = 1.2
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: Above this mean error (relative to the reach), the fit tries large offset changes.
+#: The fit tries large changes of joint offsets only if the mean error exceeds this fraction of the reach.
 _ROUNDING = 1e-13
-#: At or below this tip error (relative to the reach), the fit tries no further joint signs.
+#: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _TIP_ROUNDING = 1e-12
 #: Other joint signs are accepted only if they reduce the smallest tip error so far below this fraction.
 _OTHER_START_ERROR = 0.5
-#: Opposite changes of the offsets of two consecutive joints, rad.
+#: Angles (rad) by which the offsets of two consecutive joints change in opposite directions.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)
@@ -221,8 +221,8 @@ def apply_changes(
     for i, offset in enumerate(free[12:]):
         k = model.variable_indices[i]
         new_cells[i, k] += offset * units[k]
-    # The base's twist is in the frame of the first revolute joint.
-    # The tool's twist is in the frame of the last revolute joint.
+    # The twist that changes the base is expressed in the frame of the first revolute joint.
+    # The twist that changes the tool is expressed in the frame of the last revolute joint.
     # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
     base = _apply_twist(model.base @ model.T_0_first, free[:6], scale) @ np.linalg.inv(model.T_0_first)
     tool = np.linalg.inv(model.T_last_tip) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.T_last_tip

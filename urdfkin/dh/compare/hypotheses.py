@@ -38,8 +38,8 @@ _PARALLEL_TILT = 2e-2
 #: The minimum is over all interpretations.
 _DIFFERENCE_COST = 0.1
 #: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
-#: A larger tip error must be at most this fraction of the reach.
-#: A larger tip error must also be at most this fraction of the tip error with the stated interpretation.
+#: Above the tolerance, the tip error must be at most this fraction of the reach,
+#: and at most this fraction of the tip error of the interpretation that the file states.
 _BETTER_FRACTION = 0.05
 #: `find_better_interpretation` ignores all other keys of a row, such as limits and mimic rules.
 _ROW_KEYS = ("joint", "kind", "sense", "beta", *COLUMNS)

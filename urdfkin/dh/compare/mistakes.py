@@ -197,7 +197,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # With two or three rows, reversal exchanges first and last row.
+    # With two or three rows, a reversal only exchanges the first and the last row.
     # The loop above already contains this exchange.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))

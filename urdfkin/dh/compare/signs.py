@@ -74,8 +74,8 @@ class _PartialAlignment:
         offsets: Joint offsets without the last.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
         delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
-        free_offset: (row index, sign) of a joint offset that can be chosen freely.
-            If the offset increases, x rotates in the direction of the sign.
+        free_offset: A joint offset that can be chosen freely: index of its row, and 1 or -1.
+            With -1, x rotates backwards if the offset increases.
     """
 
     cost: float
@@ -122,7 +122,7 @@ def _drop_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignme
     """
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # A change of a free joint offset by pi reverses x.
+        # If a joint offset can be chosen freely, a change of this offset by pi reverses x.
         # Both directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.delta_in, _DECIMALS)
@@ -209,13 +209,12 @@ def _possible_transforms(
         steps.append(find_axis_transform(A, reach, default_phi, hayati=False))
     if near:
         shifted = shift_along_z(A, -delta)
-        # A prismatic axis can be moved to any parallel line.
-        # Next to a prismatic joint, any direction of x is possible.
+        # The axis of a prismatic joint can be moved to any parallel line.
+        # Therefore, x can have any direction if one of the two joints is prismatic.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
-        # For a tilt above `NEARLY_PARALLEL`, `find_axis_transform` gives a Hayati row
-        # only if the common normal is farther away than `hayati_reach`.
-        # With reach 0, this is true if the common normal misses one of the two origins.
+        # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
+        # With reach 0, a common normal is distant if it misses one of the two origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -320,7 +320,7 @@ def later_axes(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    A rotation about this axis or a shift along it is 0 if no other axis determines it.
+    If no other axis determines the rotation about this axis or the shift along this axis, the value is 0.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
@@ -435,12 +435,13 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
     return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
 
 
-#: Function that proposes poses of the next body of B. Arguments:
-#: next bodies of A and B, the two joints before these bodies,
-#: and the pose of B's current body.
+#: Function that proposes poses of the next body of B.
+#: The first argument contains the next bodies of A and B.
+#: The second argument contains the matched joints from the current to the next bodies.
+#: The third argument is the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joint pairs that the exact search tries for each pair of bodies.
+#: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
 MOST_ASSIGNMENTS = 5000
 
 #: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.

@@ -59,9 +59,9 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
 #: If several choices are equally good, the matcher compares later joints.
-#: This is the maximum number of later joints on a branch.
+#: The matcher compares at most this number of later joints on a branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root that `_exact_root_poses` computes from axes.
+#: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
 #: For equal numbers, a score with a much smaller difference (m) is better.
@@ -70,7 +70,7 @@ BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
 _Choice = TypeVar("_Choice", float, FloatArray)
-#: Number of agreeing links and axes, and largest difference (m).
+#: Number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
 
@@ -536,7 +536,7 @@ class MechanismMatcher:
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
-            # All axes and links agree, so no choice is better.
+            # If all axes and links agree, no other choice can agree better.
             if not score[1] and self.joint_matcher.links(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -824,8 +824,8 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # The rules of a joint pair require y = alpha x + beta.
-        # Only pairs with the most frequent alpha get a new offset.
+        # The rules of each joint pair require y = alpha x + beta.
+        # Only the joint pairs with the most frequent alpha get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

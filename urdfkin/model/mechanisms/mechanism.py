@@ -680,7 +680,8 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: A and B have equal root poses, and equal coordinates for each joint.
+#: With these prescribed values, A and B have equal root poses.
+#: The coordinates of each joint are also equal in A and B.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -715,8 +716,7 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: Value of B's joint with the sign and zero of B's URDF:
-    #: b_unconverted = sense * b + offset.
+    #: Joint value of B before the conversion: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
     #: `rounding` (rad or m) is then max(0, D - E).

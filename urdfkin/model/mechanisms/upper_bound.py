@@ -11,10 +11,10 @@
 urdfkin computes h joint by joint along the chain, without a search over joint values.
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
-s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
-angle of a range, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon
-is at one of its corners. At each joint, the interpolated h can be larger than the true h. The relative
-difference is proportional to the square of the distance between grid points.
+s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For all rotations R in the range
+of a joint, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon is at
+one of its corners. At each joint, the interpolated h can be larger than the true h. The relative difference
+is proportional to the square of the distance between grid points.
 
 **Recursion.** At joint i:
 
@@ -243,7 +243,8 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 #: `FINE_GRID` gives smaller bounds than `COARSE_GRID`, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
 #: Maximum number of sample values of a revolute joint's variable.
-#: If a range needs more samples, `_independent_difference` computes the bound.
+#: Maximum number of samples of a joint's range.
+#: If a range needs more samples, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -631,7 +632,7 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 def relevant_joints(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints, and their values, that affect the length of D.
+    """Return the matched joints that affect the length of D, with their values.
 
     The result begins at the first difference, or at an earlier joint that shares
     a variable with later joints.

@@ -62,7 +62,9 @@ def fix_text(
     examine: Callable[[UrdfText], Examination],
     choose: Callable[[], Callable[[Finding], bool]],
 ) -> FixResult:
-    """Apply the automatic fixes, one code after another; do not change a file with errors.
+    """Apply the automatic fixes; do not change a file with errors.
+
+    The fixes of one finding code, such as URDF507, are applied in one pass.
 
     `choose` is called before each pass, and returns a function that selects the findings to fix.
     """

@@ -383,8 +383,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Maximum length of names that are not reported.
-#: Longer names break tables and file paths.
+#: Maximum number of characters of a name; longer names break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 
