@@ -236,9 +236,8 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # `steps` is the largest width of an interval.
-            # The unit is the distance between neighbouring doubles
-            # at the largest absolute value of the quantity.
+            # `steps` is the largest width of an interval, divided by the distance between neighbouring doubles.
+            # The distance is that of the doubles next to the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

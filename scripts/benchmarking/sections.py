@@ -40,7 +40,7 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 
 
 def contender_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure the Jacobians and the accelerations of a section.
+    """Measure the time for Jacobians and accelerations, for one section of the page.
 
     | section | libraries | calls |
     |---|---|---|
@@ -155,7 +155,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 
 
 # A batch has several steps, for example the forward recursion.
-# For each k, the benchmark measures a kernel for k steps.
+# For each k, the benchmark measures a kernel that has only the first k steps.
 # The time of step k is the time for k steps, minus the time for k - 1 steps.
 # For one configuration, the benchmark measures seven lines of Python (`_calls`).
 # Most of these lines omit some steps.

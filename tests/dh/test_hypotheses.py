@@ -134,7 +134,7 @@ def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:
         in find_table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
     )
     metres = table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm")
-    assert "look like numbers in metres" in find_table_warnings(metres)[0]
+    assert "so the numbers are probably metres" in find_table_warnings(metres)[0]
     exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
     assert "a and alpha look exchanged" in find_table_warnings(table_from_rows(exchanged, "standard"))[0]
     for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):

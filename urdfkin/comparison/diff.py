@@ -147,8 +147,9 @@ class Changes:
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
     """List the changes between two versions of a robot description.
 
-    Versions of the same format are compared attribute by attribute. For different formats (URDF, MJCF, USD),
-    the changes are the differences that `same` finds. Joints and links have the names of the old version.
+    Versions of the same format are compared attribute by attribute. If the formats differ, for example URDF
+    and MJCF, `diff` lists the differences that `same` finds. Joints and links have the names of the old
+    version.
 
     Args:
         a: The old version: a robot, or a source for `load`.

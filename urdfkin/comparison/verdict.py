@@ -96,7 +96,7 @@ def same(
         b: The other robot, or a source for `load`.
         map: Joint names of `a`, each with the name of the matching joint in `b`. Only joints that urdfkin
             cannot match by names and axes need an entry.
-        bounds: Whether to bound the largest distances between frames. For different models, these bounds take
+        bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
             bounds if the models differ in many places. With 0, no boxes are used.

@@ -384,7 +384,7 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Addresses of `words` and `constants`, valid while the program exists."""
+        """Memory addresses of `words` and `constants`, valid as long as this object exists."""
         return address(self.words), address(self.constants)
 
     @cached_property

@@ -436,7 +436,7 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """A file with the key M contains screws."""
+    """Read a table, or a product of exponentials if the file has the key M."""
     data = read_mapping(path)
     return (
         _add_place(screws_from_mapping, data, str(path)) if "M" in data else parse_table_data(data, str(path))

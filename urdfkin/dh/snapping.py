@@ -63,7 +63,7 @@ def snap_chain(
     """Return the chain with snapped angles.
 
     Returns:
-        The chain, and pairs (k, change): a change of the constant pose A_k.
+        The chain, and a pair (k, change) for each change of a constant pose A_k.
     """
     exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)

@@ -141,7 +141,7 @@ def _load_code(data: bytes) -> ctypes.CDLL:
         file.write(data)
         file.flush()
         # The loader identifies a library by the library's path, which contains the file descriptor.
-        # After the file is closed, a later library can get the same file descriptor.
+        # After the file is closed, a library that is loaded later can have the same file descriptor.
         # A different number of "./" for each library makes all paths different.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_load_counter)}{descriptor}")
 
@@ -305,7 +305,7 @@ class CompiledFrame:
     def hessian(
         self, q: ConfigurationLike, out: FloatArray | None = None, *, threads: int | None = None
     ) -> FloatArray:
-        """Return the Hessian (..., 6, nv, nv): the terms of eq. 7.126 before their sum.
+        """Return the Hessian (..., 6, nv, nv), dJ/dq; J-dot is the product of the Hessian and v (eq. 7.126).
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").compile("tip")

@@ -312,9 +312,9 @@ LENGTH_ROUNDINGS = 4.0
 #: A number in a file has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
-#: The entry is a difference of two products. This difference causes an error of 0.75.
-#: In each of the two products, one factor is a difference of two other products.
-#: This factor adds an error of 0.75.
+#:
+#:     entry = a x - b y:               0.75
+#:     x = c d - e f,  y = g h - k l:   0.75
 ENTRY_ROUNDINGS = 2.0
 #: A length is rounded to twelve digits if the length changes by at most this number.
 #: The unit of the change is eps times the length of the path.

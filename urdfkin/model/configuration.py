@@ -49,8 +49,8 @@ from urdfkin.model.tree import (
 #: Largest absolute value (rad or m) of a random joint value.
 #: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
 #: A random value of a continuous joint is between -pi and pi.
-#: Some upper bounds hold only if the joints without limits travel at most this distance (m) from zero.
-#: Such joints are planar joints, floating joints, and prismatic joints without limits.
+#: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
+#: These are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
 #: A bound for a travel of 10 m also holds for a shorter travel.
 ASSUMED_LIMIT = 10.0

@@ -103,7 +103,7 @@ class Path:
     def pose_and_jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
-        # A motion does not move its own axis, so the axis is also fixed in the frame after the motion.
+        # The axis of a motion has the same components in the frames before and after the motion.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))

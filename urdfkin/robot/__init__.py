@@ -1608,7 +1608,7 @@ class Robot(Displayable):
     # -- verification --------------------------------------------------------------------------------
 
     def certificate(self) -> Certificate:
-        """Return the record of all checks so far: the oracle, the agreement, and the unchecked results.
+        """Summarize all checks so far: the oracle, the largest disagreements, and the unchecked results.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")

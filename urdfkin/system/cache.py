@@ -30,7 +30,7 @@ from urdfkin.errors import SourceError
 from urdfkin.system.files import MAX_DATA_BYTES, read_bytes, read_if_exists
 
 #: Version of the checksum.
-#: The digest in a folder's name depends on the version.
+#: The digest in a folder's name depends on the checksum's version.
 _CHECKSUM_VERSION = "sealed with its name"
 _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
 #: The modification time of this file is the folder's last use.

@@ -278,7 +278,7 @@ class _ModelReader:
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
             # Some joint classes of Pinocchio 4.1 lack the attribute `axis`.
-            # The motion subspace S of the joint contains the axis.
+            # The axis is read from the joint's motion subspace S, a vector [linear; angular].
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

@@ -94,8 +94,8 @@ def validate(
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connect_cluster`).
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
-        retry: "failed": try again to check the robots that an earlier run could not check. A failed robot's
-            file may have changed since the earlier run.
+        retry: "failed": try again to check the robots that an earlier run could not check. The
+            files of these robots are allowed to differ from the earlier run.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only this part of the work.
         progress: Callback, called before the work and after each chunk.

@@ -42,8 +42,8 @@ class ReportedMimic(TypedDict):
 class ReportedRange(TypedDict):
     """Range of a mimicked joint, reduced by the limits of mimic joints."""
 
-    lower: Annotated[float | None, doc("Lower end, rad or m; null: at most one joint value is allowed.")]
-    upper: Annotated[float | None, doc("Upper end, rad or m; null: at most one joint value is allowed.")]
+    lower: Annotated[float | None, doc("Lower end, rad or m; null if the range is empty or a single value.")]
+    upper: Annotated[float | None, doc("Upper end, rad or m; null if the range is empty or a single value.")]
     by: Annotated[list[str], doc("Names of the mimic joints that reduce the joint's range.")]
 
 

@@ -51,7 +51,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Both processes have the worker's end of the pipe. Close this end in the parent process.
+            # The parent process also has the worker's end of the pipe open, and closes it here.
             # The pipe then closes as soon as the worker ends.
             theirs.close()
 
@@ -125,7 +125,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 def _end_with(parent: int) -> None:
     """End this process when its parent process ends.
 
-    On Linux, this also works while compiled code hangs.
+    On Linux, the process ends even while compiled code hangs.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

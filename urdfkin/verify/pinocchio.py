@@ -329,11 +329,11 @@ class PinocchioOracle(Oracle):
         )
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Correct two errors in the Hessians of Pinocchio 4.1.
+        """Return Pinocchio's Hessians without two errors of Pinocchio 4.1.
 
         - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
-        - In LOCAL, two velocities of one joint may have a nonzero entry. The true value is 0, because a
-          joint's motion does not change the joint's own columns in the frame's axes.
+        - In LOCAL, the derivative of a joint's column with respect to the same joint can be nonzero. The true
+          value is 0, because a joint's motion does not change the joint's own columns in the frame's axes.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv

@@ -83,8 +83,9 @@ class Singularity(Displayable):
         rank: Number of singular values with a lower bound above 0.
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
-        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. The
-            array is empty if directions are lost in every configuration and depend on q or on a moving base.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. Some
+            frames never move in some directions. If these directions depend on q or on a moving base, the
+            array is empty.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 
@@ -153,7 +154,7 @@ class _Explanation:
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, urdfkin cannot determine the lost directions of this configuration.
+        # If these directions depend on q, urdfkin cannot tell them from directions that are lost only here.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:

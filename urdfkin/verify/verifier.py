@@ -72,7 +72,8 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks and records the results of a robot.
 
-    Pinocchio always checks tables, the accuracy study and enclosures.
+    Another oracle checks only the results of methods. Tables, accuracy studies and enclosures are always
+    checked by Pinocchio.
 
     Args:
         unverifiable: Why Pinocchio cannot check the robot.

@@ -80,7 +80,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # Axes with fewer than two powers of ten get three other ticks.
+    # If the vertical axis has fewer than two powers of ten, the axis gets three ticks between its ends.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")

@@ -12,9 +12,9 @@ Four independent measures protect the viewer:
 
 Viser checks neither the Host header nor the Origin header, and has no option for these checks. To start the
 web server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that
-checks each request. Before the viewer shows a robot, this module sends forbidden requests to the running
-server. If the server accepts a forbidden request, this module stops the server. A new version of viser can
-therefore make the viewer fail, but not make the viewer insecure.
+checks each request. To test the checks, this module sends forbidden requests to the running server before
+the viewer shows a robot. If the server accepts a forbidden request, this module stops the server. A new
+version of viser can therefore make the viewer fail, but not make the viewer insecure.
 
 Every user of the machine can read the command line of the browser. Therefore the command line does not
 contain the address of the viewer. The browser opens a file in a private folder. This file redirects the

@@ -1,4 +1,4 @@
-"""Fit a reference table to the URDF.
+"""Change a reference table so that its tip agrees with the tip of the URDF.
 
 | Fit | Changed numbers |
 |---|---|
@@ -45,7 +45,7 @@ _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: The fit ends at this mean error, relative to the reach.
+#: The fit ends when the mean error is at most this fraction of the reach.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -55,7 +55,7 @@ _MIN_WEIGHT = 1e-9
 _LAST_WEIGHT = 1.2
 #: The first number is the initial weight of every cell in the column beta.
 #: At each reweighting, the weights of the column beta are multiplied by the second number.
-#: Both numbers are below 1, so that beta changes only if a change of alpha is not enough.
+#: Both numbers are below 1. Therefore, the fit changes alpha first, and beta only if necessary.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4

@@ -274,7 +274,7 @@ def find_table_warnings(table: DHTable) -> list[str]:
         )
     elif lengths and max(lengths) < _MIN_LENGTH * 2.0:
         warnings.append(
-            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like numbers in metres:"
+            f"all lengths are at most {max(lengths) * 1e3:.3g} mm, so the numbers are probably metres:"
             " for a table in metres, write lengths = 'metres'"
         )
     angles = [*columns["alpha"], *columns["theta"]]

@@ -20,7 +20,7 @@ from urdfkin.model.tree import FloatArray, is_bounded
 
 
 def make_identifier(name: str) -> str:
-    """Return a valid name in C, Python and MATLAB.
+    """Return a name of ASCII letters, digits and "_" that is no Python keyword.
 
     >>> make_identifier("ur5 robot"), make_identifier("2dof"), make_identifier("for")
     ('ur5_robot', 'robot_2dof', 'for_')

@@ -304,7 +304,7 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of later joint axes of the same kind.
+    """Yield pairs of joint axes after the given joints: one axis of A and one of B.
 
     A branch ends at the first axis of A that is not parallel to A's reference line.
     """

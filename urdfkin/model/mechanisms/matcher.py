@@ -58,8 +58,8 @@ from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 MOST_DEPTH = 200
-#: If several choices are equally good, the matcher compares later joints.
-#: The matcher compares at most this number of later joints on a branch.
+#: If several choices at a joint are equally good, the joints after this joint decide.
+#: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
@@ -767,8 +767,8 @@ def _best_alignment(
 
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
-#: Tolerance of a zero offset, as a multiple of the angle tolerance.
-#: A zero offset is computed from the axes of two joints.
+#: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
+#: as a multiple of the angle tolerance. A zero offset is computed from the axes of two joints.
 #: The zero offset is inexact if these axes are close to each other.
 OFFSET_FACTOR = 1e4
 

@@ -330,7 +330,7 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 MAX_MIMIC_NUMBER = 1e6
 #: A mimic joint's limits can exclude part of the mimicked joint's range.
 #: URDF527 reports parts above this fraction of the range.
-#: Limits with few digits often exclude a small fraction of the range.
+#: Rounded limits often exclude a small fraction of the range.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
