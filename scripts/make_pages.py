@@ -236,7 +236,7 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # `steps` is the largest width of an interval, divided by the distance between neighbouring doubles.
+            # `steps`: largest width of an interval, divided by the distance between neighbouring doubles.
             # The distance is that of the doubles next to the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(

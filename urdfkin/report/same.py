@@ -411,9 +411,9 @@ def pictures(
 
     Without `worst`, the robots are in the zero configuration. If `written` is True, model B has the base pose
     of the given file. If `written` is False, model B has the base pose `sameness.base`, which brings model B
-    closest to model A. Each line segment is four numbers: x and y of the start point, and x and y of the end point.
-    Each picture has the lines of A and the lines of B. In the enlarged picture, another line connects the
-    origins of the worst frame in A and in B.
+    closest to model A. Each line segment is four numbers: x and y of the start point, and x and y of the end
+    point. Each picture has the lines of A and the lines of B. In the enlarged picture, another line connects
+    the origins of the worst frame in A and in B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
