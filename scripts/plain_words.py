@@ -2,6 +2,8 @@
 
     python scripts/plain_words.py [PATH ...]         # words of the list; exit 1 if there is one
     python scripts/plain_words.py --long [PATH ...]  # sentences of more than 30 words, for information
+    python scripts/plain_words.py --sample 50 --seed 1             # random sentences, for a reader
+    python scripts/plain_words.py --sample 50 --seed 1 --places    # the same sentences, with their places
 
 The script reads the text of pages, docstrings, comments and messages. CONTRIBUTING.md states the rules of
 style.
@@ -10,6 +12,7 @@ style.
 import argparse
 import ast
 import io
+import random
 import re
 import sys
 import tokenize
@@ -54,7 +57,8 @@ class Passage(NamedTuple):
     text: str
 
 
-def passages(paths: list[Path]) -> Iterator[Passage]:
+def passages(paths: list[Path], code: str = "") -> Iterator[Passage]:
+    """Yield the passages of text; `code` replaces each piece of code in backticks."""
     for file in (file for path in paths for file in (sorted(path.rglob("*")) if path.is_dir() else [path])):
         name = file.relative_to(ROOT)
         if file.suffix not in _SUFFIXES or _SKIPPED & set(name.parts):
@@ -65,11 +69,11 @@ def passages(paths: list[Path]) -> Iterator[Passage]:
                 if line.startswith("```"):
                     fenced = not fenced
                 elif not fenced:
-                    yield Passage(str(name), number, re.sub(r"`[^`]*`", "", line))
+                    yield Passage(str(name), number, re.sub(r"`[^`]*`", code, line))
             continue
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
-                yield Passage(str(name), node.lineno, re.sub(r"`[^`]*`", "", node.value))
+                yield Passage(str(name), node.lineno, re.sub(r"`[^`]*`", code, node.value))
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
             if token.type == tokenize.COMMENT:
                 yield Passage(str(name), token.start[0], token.string.lstrip("#: "))
@@ -95,13 +99,33 @@ def find_long_sentences(paths: list[Path]) -> list[str]:
     return found
 
 
+def sample_sentences(paths: list[Path], number: int, seed: int) -> list[tuple[str, str]]:
+    """Return (place, sentence) of random sentences with 7 to 45 words."""
+    found = dict[str, str]()
+    for passage in passages(paths, code=r"\g<0>"):
+        for sentence in re.split(r"(?<=[.!?:])\s+(?=[A-Z`\"(])|\n\s*\n", passage.text):
+            words = sentence.split()
+            letters = sum(one.isalpha() or one == " " for one in sentence)
+            if 7 <= len(words) <= 45 and letters > 0.75 * len(sentence) and "|" not in sentence:
+                found.setdefault(" ".join(words), f"{passage.file}:{passage.line}")
+    chosen = random.Random(seed).sample(sorted(found), min(number, len(found)))
+    return [(found[sentence], sentence) for sentence in chosen]
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     default = [ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
     parser.add_argument("paths", nargs="*", type=Path, default=default)
     parser.add_argument("--long", action="store_true", help="list long sentences instead")
+    parser.add_argument("--sample", type=int, metavar="N", help="print N random sentences instead")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the random sentences")
+    parser.add_argument("--places", action="store_true", help="print the place of each random sentence")
     options = parser.parse_args()
     chosen = [path.resolve() for path in options.paths]
+    if options.sample is not None:
+        for i, (place, sentence) in enumerate(sample_sentences(chosen, options.sample, options.seed), 1):
+            print(i, *([place] if options.places else []), sentence, sep="\t")
+        sys.exit()
     lines = find_long_sentences(chosen) if options.long else find_words(chosen)
     print("\n".join(lines))
     sys.exit(bool(lines) and not options.long)
