@@ -8,9 +8,10 @@ A as a product:
 
 The factors Rz(phi) and Tz(delta) are motions about and along the first joint's axis. They commute with the
 motion of the first joint, so phi and delta are parts of theta and d in the first joint's row. In the same
-way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes, beta is 0, and
-x has two possible directions. For each direction, the other six numbers are unique (Denavit and Hartenberg).
-docs/dh.md explains the numbers for parallel and for nearly parallel axes.
+way, phi_next and delta_next are parts of theta and d in the second joint's row. For skew axes that are not
+nearly parallel, beta is 0. Their x axis has two possible directions. For each direction of x, the six numbers
+other than beta are unique (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for
+nearly parallel axes.
 
 For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
 pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
@@ -43,7 +44,7 @@ from urdfkin.model.tree import FloatArray, Joint
 #: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
-#: Axes with a tilt (rad) above this limit never get a Hayati row, even if their common normal is far away.
+#: Two axes get a Hayati row only if the sine of their tilt is below this number.
 MAX_HAYATI_TILT = 0.35
 
 
@@ -94,7 +95,8 @@ def find_axis_transform(
 
     Tilts and lengths within `noise` become zero.
     `default_phi` is used if the axes do not determine phi.
-    The offset along parallel axes becomes `delta_next`, or `delta` with `offset_in_delta`.
+    For parallel axes, `delta_next` is the offset along the axes, and `delta` is 0.
+    With `offset_in_delta`, `delta` is this offset, and `delta_next` is 0.
     `reach` is the length of the path (m).
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
@@ -191,7 +193,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether the next row can compensate for d."""
+        """Whether the axes do not determine d: parallel axes, or a Hayati row."""
         return tilt_sine(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
@@ -208,8 +210,9 @@ class PairWithReference:
 
     @property
     def hayati_offset(self) -> float | None:
-        """Offset (m) along the first axis to the x axis of a Hayati row.
+        """Value of z (m) in this joint's frame where a Hayati row's x axis intersects the joint's axis.
 
+        The value is chosen so that cell a matches the reference.
         None: parallel axes in the path or in the reference, or |offset| > reach.
 
             p: origin of the next joint's frame
@@ -281,7 +284,11 @@ def _choose_offset(
 ) -> float:
     """Choose d of row i.
 
-    A free d is chosen so that another cell equals the reference.
+        axes determine d                              any number, because `find_transform` ignores d
+        revolute joint, i > 0 or reference d = 0      d of the reference
+        other joints                                  d with which another cell equals the reference
+
+    The other cell is d of a later row, or a of a Hayati row. Without such a cell, d equals the reference.
     """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
@@ -313,7 +320,8 @@ def _choose_phi(
 ) -> float:
     """Return the phi with which theta of row i equals the reference.
 
-    If prismatic joints follow, phi can match theta in the rows of these joints instead.
+    Exception: prismatic joints i + 1 to k follow a revolute joint i or row 0.
+    If k is the first of them whose phi the axes determine, theta of rows i + 1 to k equals the reference.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
@@ -378,14 +386,14 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Angles and lengths of a constant pose up to these values count as rounding errors."""
+    """Tilts and lengths between consecutive axes up to these values count as rounding errors."""
 
     radians: float
     metres: float
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Bound the rounding errors of a constant pose.
+    """Bound the rounding errors of a constant pose between two joint frames.
 
     The bound covers angles rounded to fifteen digits.
 

@@ -83,7 +83,7 @@ def derive(chain: FrameChain, options: DerivationOptions, like: DHTable | None =
 
     `like` is a standard table of the same joints.
     With `like`, `options.sign` has no effect.
-    `options.parallel_offset` then has an effect only if it is "first".
+    With `like`, `options.parallel_offset` has an effect only if it is "first".
     """
     constants = _reverse_axes(chain, options.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -188,7 +188,11 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift a nearly parallel axis, to avoid a common normal far away from the robot."""
+    """Shift the axis of the prismatic joint k if a neighbouring axis is nearly parallel.
+
+    The shifted axis passes through the neighbouring joint's origin.
+    Without the shift, the common normal of the two axes could be far away from the robot.
+    """
     if k > 0 and noise[k].radians < tilt_sine(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -313,7 +317,7 @@ def _match_last_row(
     """Copy theta, a and alpha from the reference, and adjust the tool.
 
     If the reference has d = 0, d becomes 0.
-    Nothing is copied if neither table has a tool and theta nearly agrees.
+    Nothing is copied if both tables have no tool and their thetas differ by less than 1e-3 rad.
     """
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
@@ -358,7 +362,10 @@ def _make_last_row(
     options: DerivationOptions,
     noise: PoseTolerance,
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """`A` is the tip's pose in a frame with origin O_{n-1} and the last joint's axes."""
+    """Compute theta, d, a and alpha of the last row, and the tool.
+
+    `A` is the tip's pose in the last joint's frame, after a shift of this frame along z to O_{n-1}.
+    """
     if _fits_last_row(A, options, noise):
         phi = math.atan2(A[1, 0], A[0, 0])
         a = clean_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)

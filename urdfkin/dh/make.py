@@ -49,7 +49,7 @@ def find_reversed_joints(
     patterns = [fit.senses for fit in find_sign_fits(chain, without_ends)]
     # The base can compensate for a reversed first joint.
     # The tool can compensate for a reversed last joint.
-    # Therefore, both signs of these two joints are tried.
+    # Therefore, both directions of the first and the last joint are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -120,28 +120,33 @@ def make_dh_table(
         convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
         near_parallel: "hayati": nearly parallel axes have a fifth parameter, beta. "strict": each row has
             only four parameters; offsets of kilometres are possible.
-        snap: Largest change (rad) of an angle that becomes a multiple of 15 degrees. The table's attribute
-            `snap` reports the effect.
-        last: "tip": the last row ends at the tip if possible. "flange": the tool leads from the last axis
-            to the tip.
-        parallel_offset: Rows that contain the offsets d along consecutive parallel axes. "last": the last
-            row has the sum. "first": the first row has the sum. "each": each row has the offset of its link.
+        snap: Tolerance, rad. An angle becomes a multiple of 15 degrees if it changes by at most `snap`. The
+            table's attribute `snap` reports the effect.
+        last: "tip": the last row ends at the tip if possible. "flange": the last row ends on the last joint's
+            axis, and the tool leads from this axis to the tip.
+        parallel_offset: Rows that contain the offsets d along consecutive parallel axes. "last": the row of
+            the last of these axes contains the sum of the offsets. "first": the row of the first of these
+            axes contains the sum. "each": row i contains the offset from joint i to joint i + 1.
         flip: Joints whose positive direction is reversed (`sense` is -1).
-        first: "base": d_1 and theta_1 lead to the first axis, if possible. "joint": the base leads to the
-            first axis, and d_1 and theta_1 are 0 (Craig's frame 0).
+        first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
+            this axis. "joint": d_1 and theta_1 are 0, and the base contains both (Craig's frame 0).
         sign: Direction of x. "theta": |theta| <= pi/2. "a": a >= 0. "alpha": alpha >= 0.
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
-            The axis is shifted if this avoids a tool, a base translation or a distant common normal.
-            "minimal": the axis passes through the origin of a neighbouring revolute joint, so a is 0. The
-            next joint has priority. Without a revolute neighbour, "drawn" applies.
-        like: A published table. The result copies joint directions, x axes and offsets d along parallel axes.
-            The zeros of the first and last joints are copied too. All other numbers come from the URDF. The
-            options `last`, `parallel_offset`, `flip`, `first` and `sign` must then have default values.
+            The first joint's axis passes through the base's origin instead. The last joint's axis passes
+            through the tip if a standard table then needs no tool. With near_parallel="strict", an axis
+            passes through the origin of a neighbour with a nearly parallel axis. "minimal": the axis passes
+            through the origin of a neighbouring revolute joint, so a is 0. The next joint has priority.
+            Without a revolute neighbour, the axis is that of "drawn".
+        like: A published table. The result copies the positive joint directions, the directions of the x axes
+            and the offsets d along parallel axes. The result also copies theta of the first and last row, and
+            a and alpha of a standard table's last row. Base and tool compensate for these copies. All other
+            numbers come from the URDF. With `like`, the options `last`, `parallel_offset`, `flip`, `first`
+            and `sign` must have their default values.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
         InputError: an option is invalid or excluded by `like`, or a joint is planar or floating.
-        RangeError: the square of a length overflows.
+        RangeError: a coordinate of a joint's origin in the URDF is above 1e150 m.
     """
     exact = make_chain(tree, tip, base)
     # The whole path from the root is checked, because Pinocchio computes poses relative to the root.

@@ -91,7 +91,7 @@ def _flatten(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list
     """Flatten the batch axes.
 
     Returns:
-        The common batch shape, and arrays (n, rows).
+        The common batch shape, and arrays (number of configurations, rows).
     """
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)

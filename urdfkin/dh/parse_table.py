@@ -280,7 +280,8 @@ def _find_convention(grid: _Grid) -> str | None:
     """Find the convention.
 
     Returns:
-        None if the text names no convention or both.
+        "modified" if a heading has the index i-1. Otherwise the convention that the text names; None if the
+        text names no convention or both.
     """
     if any(column.previous for column in grid.columns):
         return "modified"

@@ -139,8 +139,8 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Detect the Robotics Toolbox's order theta, d, a, alpha.
 
-    An angle is usually a multiple of 15 (degrees) or of pi/12 (radians).
-    A length is rarely such a multiple.
+    A column of angles usually contains multiples of 15 (degrees) or of pi/12 (radians).
+    A column of lengths rarely contains such a multiple, except 0.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_column_order(row) for row in lists):

@@ -195,8 +195,8 @@ class ProductOfExponentials(Displayable):
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        In the zero configuration, each link frame is parallel to the base frame.
-        The frame's origin is on the axis of the link's joint.
+        The frame of the link NAME_link has its origin on the axis of the joint NAME.
+        In the zero configuration, this frame is parallel to the base frame.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links

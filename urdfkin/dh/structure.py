@@ -75,7 +75,8 @@ class StructureKind:
     Attributes:
         radians: Largest deviation of an angle.
         metres: Largest deviation of a length.
-        at: Intersection of the axes in the base frame and zero configuration, m.
+        at: Centre of a spherical wrist, shoulder or joint, m; None for all other properties. The centre is in
+            the base frame and the zero configuration.
     """
 
     name: str
@@ -343,7 +344,7 @@ class OpwParameters:
 def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameters:
     """Find the OPW parameters.
 
-    `tolerance` is the largest allowed error of the tip (m and rad).
+    Each entry of the tip's pose may have an error up to `tolerance` (m in the position).
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -408,7 +409,8 @@ def _read_parameters(table: DHTable) -> OpwParameters:
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the axes h_i and the vectors P_i.
 
-    All joints must be revolute. P_0 begins at the base, and P_n ends at the tip.
+    All joints must be revolute.
+    The vector P_0 begins at the base's origin, and P_n ends at the tip's origin.
     Solvers detect intersecting axes by an exactly zero vector.
 
     Returns:

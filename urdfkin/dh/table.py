@@ -123,9 +123,10 @@ class DHRow:
 
     @property
     def distance_to_normal(self) -> float:
-        """Distance (m) along the next axis from x to the common normal.
+        """Distance (m) of two points on the next axis; 0 except in a Hayati row.
 
-        A Hayati row's x axis intersects the next axis, but is not the common normal.
+            first point    intersection with the Hayati row's x axis
+            second point   end of the common normal
 
             distance = |a sin(beta)| / sin^2(tilt)
 
@@ -284,12 +285,12 @@ class SnapReport:
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits. Prismatic
-            joints without limits may travel at most 10 m.
+        metres: Guaranteed bound of the tip's displacement. The bound holds within the joint limits. The bound
+            assumes that a prismatic joint without limits travels at most 10 m.
         radians: Guaranteed bound of the tip's rotation.
         per_metre: Increase of the bound per metre of travel, by prismatic joint.
-        measured_metres: Largest displacement of the tip in samples.
-        measured_radians: Largest rotation of the tip in samples.
+        measured_metres: Largest distance between the tips of the exact path and of the table, in samples.
+        measured_radians: Largest angle between these two tip frames, in samples.
         samples: Number of sampled configurations.
     """
 
@@ -311,7 +312,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (...,) of the tip's displacement (m).
+        """Return a guaranteed bound (...,) of the tip's displacement by the snapped angles (m).
 
         `values` are the prismatic joints' values by name.
         """
@@ -449,7 +450,10 @@ class DHTable(Displayable):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the independent and the mimicked joints, in row order.
+        """Names of the coordinates, in row order.
+
+            row of an independent joint   the joint's own name
+            row of a mimic joint          the name of the mimicked joint, listed only once
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").joint_names
@@ -497,9 +501,11 @@ class DHTable(Displayable):
 
         The bound divided by `span` bounds the orientation error in radians.
 
-            bound = length of the chain * sum of the rounding errors of rows and angles
+            bound = eps * (8 (n + 1) + sum of |angles|) * length
+            angles: values of the revolute joints
+            length: `span` + sum of |values of the prismatic joints| + length of the base's translation
 
-        `urdfkin.kinematics.roundings` counts these rounding errors.
+        `urdfkin.kinematics.roundings` derives the factor 8.
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)

@@ -53,7 +53,7 @@ class TreeRow:
     The joint's value is added to theta (sigma 0) or r (sigma 1).
 
     Attributes:
-        antecedent: Row index of the antecedent link, from 0; -1 is the root.
+        antecedent: Row index, from 0, of the nearest moving link towards the root; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
         mimicked_joint: The mimicked joint; without a mimic rule, the joint itself.
         multiplier: value = multiplier * mimicked value + offset

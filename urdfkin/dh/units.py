@@ -149,7 +149,7 @@ def _parse_number(value: object) -> float:
 
 
 def convert_to_si(name: str, number: float, units: Units) -> float:
-    """Convert a cell to metres or radians.
+    """Convert a number of the column `name` to metres or radians.
 
     90 degrees become exactly math.pi / 2.
     """
@@ -205,7 +205,7 @@ class Cell:
         unit: "rad" (also with pi), "deg", "m" or "mm"; None: the table's unit.
         factor: Factor of the variable; None without variable.
         variable: Number in the variable's name, 2 for q2.
-        text: Text of a single number, otherwise "".
+        text: Text of the constant, such as "90", if the constant is a single number; otherwise "".
     """
 
     number: float

@@ -69,7 +69,7 @@ def check_no_mimic(table: DHTable, what: str) -> None:
 
 
 def format_limits(row: DHRow) -> str:
-    """Return "lower, upper", or "" without finite limits."""
+    """Return "lower, upper" if both limits are finite, otherwise ""."""
     return format_numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 

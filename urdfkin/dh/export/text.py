@@ -282,7 +282,6 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     q = sample_within_limits(table)
     # `DHTable` rejects rotations that are rounded to few digits.
     # Therefore, the table is evaluated without base and tool.
-    # The table's poses are multiplied by the rounded base and tool.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
@@ -310,7 +309,7 @@ def _round_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _largest_coordinate(table: DHTable, row: DHRow) -> float:
-    """Return the mimicked joint's largest absolute value.
+    """Return the largest absolute value of the joint that the row's joint mimics.
 
     The value is 0 without a mimic rule, or with the multiplier 0.
     """
