@@ -62,7 +62,7 @@ from urdfkin.kinematics.rotation import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingFrame:
-    """The motion of frame 1 relative to frame 0, in the axes of frame 0.
+    """Pose, velocity and acceleration of frame 1 relative to frame 0, in the axes of frame 0.
 
     Attributes:
         d_0_1: Vector from O_0 to O_1.

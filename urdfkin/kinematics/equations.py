@@ -93,7 +93,7 @@ def about_z(sine, cosine, zero, one):
 
 
 def rotation_of_quaternion(x, y, z, w):
-    """Return the rotation of a unit quaternion with scalar w."""
+    """Return the rotation of a unit quaternion; w is the scalar part."""
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
@@ -230,8 +230,7 @@ def rate_in_turning_axes(rate, w, x):
 
 
 # -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
-# Each derivative is multiplied by its joint's velocity.
-# The sum over all joints is the column's time derivative (7.126).
+# Time derivative of column i (7.126): sum over all joints j of d(column i)/dq_j * v_j
 
 
 def turned_along(w, linear, angular):

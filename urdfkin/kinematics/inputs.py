@@ -21,9 +21,9 @@ UNIT_TOLERANCE = 1e-12
 #: The absolute values of the entries in a row of R sum to at most sqrt(3).
 #: Therefore, an entry of R R^T - I is at most 2 * 5e-10 * sqrt(3), about 1.73e-9.
 ROTATION_TOLERANCE = 2e-9
-#: Letters of NumPy's `dtype.kind` for data that are not real numbers.
-#: These data are complex numbers, bytes, text, timedelta, datetime and void.
-#: NumPy converts these data to floats without reporting an error.
+#: Letters of NumPy's `dtype.kind` for data that are not real numbers:
+#: c complex, S bytes, U text, m timedelta, M datetime, V void.
+#: For example, NumPy converts dates and the text "1.5" to floats without reporting an error.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
@@ -101,7 +101,7 @@ def as_rotations(value: ArrayLike, name: str) -> FloatArray:
 def rotation_defect(R: FloatArray) -> FloatArray:
     """Return the largest absolute entry of R R^T - I.
 
-    A reflection, a singular matrix or an overflow gives inf.
+    A computed determinant <= 0 or an overflow gives inf.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))

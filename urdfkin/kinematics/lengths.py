@@ -31,14 +31,14 @@ def translate_point(state: LinkBounds, d: Length) -> LinkBounds:
 
 
 def after_revolute(state: LinkBounds, d: Length, o: Length, o_rate: Length) -> LinkBounds:
-    """Return the bounds after a revolute joint (7.127, 7.129)."""
+    """Return the child link's `LinkBounds` for a revolute joint (7.127, 7.129)."""
     p, w, vel, alpha, acc = translate_point(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
 def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> LinkBounds:
-    """Return the bounds after a prismatic joint (7.128, 7.130)."""
+    """Return the child link's `LinkBounds` for a prismatic joint (7.128, 7.130)."""
     p, w, vel, alpha, acc = translate_point(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
@@ -46,7 +46,7 @@ def after_prismatic(state: LinkBounds, d: Length, u: Length, u_rate: Length) -> 
 def after_free_joint(
     state: LinkBounds, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length
 ) -> LinkBounds:
-    """Return the bounds after a planar or floating joint."""
+    """Return the child link's `LinkBounds` for a planar or floating joint."""
     p, w, vel, alpha, acc = translate_point(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)

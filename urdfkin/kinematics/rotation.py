@@ -174,7 +174,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
 
     Args:
         Rs: (..., n, 3, 3) orientations of frame i + 1 in frame i.
-        ws: (..., n, 3) angular velocities of frame i + 1 in frame i.
+        ws: (..., n, 3) angular velocities of frame i + 1 relative to frame i, in frame i.
 
     Returns:
         Angular velocity of frame n in frame 0.
@@ -497,7 +497,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
 
     At the singularity, only the sum or difference of the
     first and third angle is determined.
-    The third angle then follows from the first angle.
+    For moving axes, the third angle then follows from the first angle.
+    For fixed axes, the first angle then follows from the third angle.
     """
     axes = find_sequence(name)
     R = as_rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0; arctan2(0, -0) is pi.

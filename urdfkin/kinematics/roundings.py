@@ -249,7 +249,7 @@ EPS = sys.float_info.epsilon
 SINGLE_ROUNDOFF = 2.0**-24
 #: The smallest normal number.
 SMALLEST_NORMAL = sys.float_info.min
-#: Smallest nonzero value of `eps * scale`: the smallest subnormal number.
+#: `eps * scale` for the smallest nonzero scale, `SMALLEST_NORMAL`: the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST_NORMAL
 #: Least divisor: `max(x, MIN_DIVISOR)` avoids a division by 0. Every measured number is larger.
 MIN_DIVISOR = 1e-300
@@ -261,8 +261,8 @@ MIN_DIVISOR = 1e-300
 PINOCCHIO_ROUNDINGS = 24.0
 #: urdfkin and MuJoCo may differ by at most joints * factors * MUJOCO_ROUNDINGS * eps * scale.
 #: `joints` is the same number as for Pinocchio.
-#: `factors` is twice the number for Pinocchio.
-#: The reason is that MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
+#: `factors` is 2 * (`factors` for Pinocchio).
+#: A term has more factors because MuJoCo computes at a centre of mass (`urdfkin.verify.bounds`).
 MUJOCO_ROUNDINGS = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE_ROUNDINGS = 8.0
@@ -283,8 +283,8 @@ SINGLE_POLYNOMIAL = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference of the constant poses that two programs compute from the same file, in eps per joint.
-#: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps,
-#: from the first and third row of the first table above.
+#: Largest possible difference: 1.5 + 1.8 + 3.1 + 12.5 = 18.9 eps.
+#: These four counts are in rows 1 and 3 of the first table in the docstring above.
 #: Standard deviation: 2.4 eps.
 #: 13.7 eps / 2.4 eps = 5.7.
 CONSTANT_POSE_ROUNDINGS = 13.7
@@ -293,9 +293,9 @@ CONSTANT_POSE_ROUNDINGS = 13.7
 AXIS_ROUNDINGS = 5.0
 #: Error of the angle between consecutive axes, in eps per joint.
 #: Angles in a file are rounded.
-#: With fifteen digits (DBL_DIG), the error is half a unit of the last digit:
+#: An angle with fifteen digits (DBL_DIG) has an error of half a unit of its last digit:
 #: 5e-15 rad, or 22.5 eps, for angles up to pi.
-#: Roll and pitch both change the angle between the axes.
+#: If both joint axes are z axes, roll and pitch both change the angle between the joint axes.
 #: Yaw does not change this angle.
 #: Therefore, the error is twice 22.5 eps.
 FILE_ROUNDINGS = 45.0
@@ -329,7 +329,7 @@ ROTATION_ROUNDINGS = 8.0
 
 #: Allowed error (in eps) of a mimicked joint's computed limit.
 #: urdfkin computes this limit from a mimic joint's limit.
-#: The conversion has a subtraction and a division.
+#: The computed limit is (limit of the mimic joint - offset) / multiplier: a subtraction and a division.
 #: The mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
 #: The sum of the four errors is 2.0.
@@ -338,13 +338,12 @@ MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
 def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps.
+    """Return the allowed difference between urdfkin and Pinocchio for `factors` = 1, in eps.
+
+        PINOCCHIO_ROUNDINGS * joints + 2 tilt / eps
 
     Both arguments describe the path: `joints` is the number of joints,
     and `tilt` is the sum of the joints' tilts, rad.
-
-    Returns:
-        Allowed difference between urdfkin and Pinocchio for `factors` = 1, eps.
 
     >>> joint_roundings([7, 8]).tolist()
     [168.0, 192.0]
@@ -353,7 +352,7 @@ def joint_roundings(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def table_roundings(rows: int) -> float:
-    """Return the error of a table's pose.
+    """Return the largest rounding error of a table's pose.
 
     Returns:
         Error without rounded joint values, eps.
@@ -362,7 +361,7 @@ def table_roundings(rows: int) -> float:
 
 
 def read_back_roundings(rows: int) -> float:
-    """Return the allowed difference between table and URDF.
+    """Return the allowed difference between the poses of a table and of its URDF.
 
     The URDF was written from the table:
 
@@ -379,9 +378,9 @@ def read_back_roundings(rows: int) -> float:
 
 
 def fit_roundings(rows: int) -> float:
-    """Return the allowed difference between URDF and fitted table.
+    """Return the allowed difference between the poses of a URDF and of the table fitted to the URDF.
 
-    After the last iteration of the fit, the error is at most 12.5 * table_roundings(rows).
+    After the last iteration of the fit, the error of the pose is at most 12.5 * table_roundings(rows).
 
     Returns:
         Difference in eps.

@@ -16,9 +16,9 @@ from urdfkin.model.tree import FloatArray, freeze
 class BaseMotion:
     """Motion of the robot's root link relative to the world.
 
-    In the textbook, the world frame has the number -1. Every field may have leading batch axes. These axes
-    broadcast with the batch axes of the configuration. The fields store the given numbers unchanged, because
-    a verification computes Pinocchio's input from these numbers.
+    In the textbook, the world frame has the number -1. Every field may have leading batch axes. The
+    batch axes of all fields broadcast with the batch axes of the configuration. The fields store the given
+    numbers unchanged, because a verification computes Pinocchio's input from these numbers.
 
     Attributes:
         placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals. The results

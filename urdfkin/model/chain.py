@@ -35,7 +35,7 @@ from urdfkin.model.tree import (
 )
 
 #: Minimum size (m) of a robot in a comparison.
-#: If all frames coincide, the computed size of the robot is 0.
+#: If all frames have the same origin, the computed size of the robot is 0.
 MIN_ROBOT_SIZE = 1e-9
 
 
@@ -72,9 +72,9 @@ class FrameChain(Displayable):
         base: Name of the first frame. Results are expressed in this frame.
         tip: Name of the last frame.
         joints: The moving joints in path order.
-        T_last_tip: (4, 4) pose of the tip in the last joint's frame. Without joints, the pose in the base.
+        T_last_tip: (4, 4) pose of the tip in the last joint's frame; in the base frame if `joints` is empty.
         lengths: (n + 1,) path lengths between joint origins, m, including the fixed joints. Entry k is an
-            upper bound on the translation in A_k. The bound holds for any rotations of the fixed joints.
+            upper bound on the translation in A_k. Other rotations of the fixed joints give the same bound.
         pose_counts: (n + 1,) number of URDF joint poses whose product is A_k.
 
     >>> import urdfkin
@@ -228,9 +228,9 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
     def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
-        """Return the joint origins (..., n + 1, 3) in the base frame, m.
+        """Return the origins of the n joints and of the tip (..., n + 1, 3) in the base frame, m.
 
-        The last origin is the tip's origin. Without `q`, the configuration is zero.
+        Without `q`, the configuration is zero.
 
         >>> import urdfkin
         >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

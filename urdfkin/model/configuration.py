@@ -123,7 +123,7 @@ def joint_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the joint ranges within the limits of mimic joints.
 
-    A joint whose `allowed_range` is None has its own range.
+    If mimic joints allow at most one value, the mimicked joint has its own range.
     """
     ranges = joint_ranges(tree)
     narrowed = {one.joint: one.allowed_range for one in range_reductions(tree)}
@@ -189,7 +189,7 @@ def _widen_limits(limit: Limit) -> tuple[float, float]:
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: Largest deviation from a mimic rule in `from_pinocchio`, rad or m.
+#: `from_pinocchio` allows a deviation from a mimic rule of this number * max(1, largest |value|).
 _MIMIC_TOLERANCE = 1e-9
 
 
@@ -334,7 +334,8 @@ def parse_locks(
 ) -> dict[str, float]:
     """Return the value of each locked joint, rad or m.
 
-    A locked joint without a value is at 0, or at the pose's value.
+    A locked joint without a value is at the named pose's value.
+    Without a named pose, the joint is at 0.
     Only `joints` stay movable; by default, all joints not in `lock`.
     """
     layout = coordinate_layout(tree, "q")
@@ -490,7 +491,7 @@ def _degrees_hint(joint: Joint, value: float) -> str:
 
 
 #: Maximum number of configurations in which urdfkin looks for angles in degrees.
-#: All configurations of a batch have the same unit.
+#: A user gives all configurations of a batch in the same unit.
 #: Therefore, a few configurations are enough.
 _MAX_CHECKED = 16
 
@@ -546,7 +547,7 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert Pinocchio's configurations to urdfkin's.
 
-    Continuous and planar joints get angles in [-pi, pi].
+    (cos, sin) of a continuous or planar joint becomes an angle in [-pi, pi].
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):

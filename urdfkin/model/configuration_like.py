@@ -32,7 +32,7 @@ from urdfkin.kinematics.inputs import FloatArray, as_floats
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8
-#: The blank between a number and its unit.
+#: Pattern of a blank between a number and its unit.
 _BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _BLANKS_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
@@ -50,7 +50,7 @@ class CoordinateLayout:
         symbol: "q", "v" or "a".
         units: "rad", "m", "" without unit, or None if unknown.
         spans: First index and count, for joints with several numbers.
-        hints_by_name: Hints for joints without a coordinate.
+        hints_by_name: For errors about a joint without a coordinate: hints by the joint's name.
         hints_by_length: Hints for wrong lengths.
     """
 
@@ -83,7 +83,7 @@ with 'neutral, elbow=...'
     def parse_by_name(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values by name, and the named pose.
+        """Return the values by name, and the configuration of the named pose.
 
         The pose is None if the text names no pose.
 
@@ -209,7 +209,7 @@ with 'neutral, elbow=...'
 
 
 def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return text or a mapping; None for other values.
+    """Return text and mappings unchanged, and None for numbers.
 
     A table with labels becomes a mapping.
 

@@ -95,7 +95,7 @@ def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Split `block` into a linear and an angular part."""
+    """Split the joint's numbers of q or v into a linear and an angular part."""
     if joint.kind is JointKind.FLOATING:
         return block[..., :3], block[..., 3:]
     if joint.kind is not JointKind.PLANAR:

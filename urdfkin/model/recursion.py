@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 SixVector = tuple[Number, ...]
-#: Slice of q, v or a from the joint's first number.
+#: q[k:], v[k:] or a[k:], where k is the index of the joint's first number.
 JointSlice = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -45,7 +45,7 @@ class Column:
 
     Attributes:
         carrier: State of the frame to which the axis is fixed.
-        order: Position on the path, counted from the base.
+        order: Index of the joint on the path; the index increases from the base.
         factor: Multiplier of the mimic rule.
     """
 
@@ -112,7 +112,7 @@ class Recursion:
     def _after_free_joint(self, s: LinkState, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> LinkState:
         """Return the state after a planar or floating joint.
 
-        The four vectors `rates` are in the child link's axes.
+        `rates`: linear and angular joint velocity, then joint acceleration, in the child link's axes.
         """
         eq, s = self.eq, self.rotate_frame(self.translate_frame(s, slide), S)
         u, o, u_rate, o_rate = (self.express(s, x) for x in rates)
@@ -181,7 +181,7 @@ class Recursion:
     def _add_mimic_columns(
         self, s: LinkState, reference: Reference, nv: int, columns: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[SixVector]:
-        """Add mimic joints' columns to the mimicked joints' columns."""
+        """Add each mimic joint's column, times the multiplier, to the mimicked joint's column."""
         out: list[SixVector] = [(0,) * 6] * nv
         for column, linear, angular in columns:
             six = self.in_reference(s, reference, linear, angular)
@@ -195,7 +195,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, SixVector]]:
         """Yield the derivatives of the columns.
 
-        The tuples are (i, j, factor, x). For each i and j, the sum of factor * x is d(column i)/dq_j.
+        The tuples are (i, j, factor, x), where i and j are indices of v.
+        For each i and j, the sum of factor * x is d(column i)/dq_j.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
@@ -207,9 +208,9 @@ class Recursion:
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
         """Return d(column i)/dq_j.
 
-        six:     column i
-        by:      column j
-        before:  j <= i
+        six:     linear and angular part of column i
+        by:      linear and angular part of column j
+        before:  True if joint j is joint i or precedes joint i on the path
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -52,7 +52,10 @@ class LinkFrame(FrameName):
 
 
 class JointFrame(FrameName):
-    """The name of a joint's frame, which is the child link's frame."""
+    """The name of a joint with the prefix "joint:".
+
+    The frame is the child link's frame.
+    """
 
     __slots__ = ()
     prefix = "joint:"
@@ -152,8 +155,9 @@ class Joint:
 
     Attributes:
         parent: Index of the parent link.
-        T_parent_joint: Pose at q = 0, m.
-        axis: (3,) unit axis in the joint frame; (1, 0, 0) without axis.
+        T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, m.
+        axis: (3,) unit axis in the joint frame. A planar, floating or fixed joint has (1, 0, 0).
+            A locked joint keeps its axis.
         tilt: Angle between `axis` and Pinocchio's axis, rad. urdfkin's kinematics do not use this angle.
         lock: None unless the user fixed the joint.
     """
@@ -198,7 +202,7 @@ class Joint:
     def length(self) -> float:
         """Length of the offset from the parent link, m.
 
-        The displacement of a locked prismatic joint is added.
+        For a locked prismatic joint, |displacement| is added.
         """
         # hypot avoids squares, which overflow for 1e200 and underflow for 1e-200.
         length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
@@ -212,7 +216,7 @@ class Lock:
     """A joint that the user fixed.
 
     Attributes:
-        q: Coordinate of the independent joint, rad or m.
+        q: Coordinate of `joint`, or of the joint that `joint` mimics, rad or m.
     """
 
     joint: Joint
@@ -248,7 +252,7 @@ class KinematicTree:
 
     Attributes:
         links: The link `links[i + 1]` is the child of `joints[i]`.
-        joints: All joints in Pinocchio's order; a parent link precedes its child link.
+        joints: All joints in Pinocchio's order, with `joints[i].parent` <= i.
         poses: Named poses, each for some joints.
     """
 

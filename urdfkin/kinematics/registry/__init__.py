@@ -21,7 +21,7 @@ from urdfkin.kinematics.latex import latex
 LAST_EQUATION = 130
 #: Numbers of the equations whose statements are unknown.
 #: Page 2 of the chapter, with equations 7.6 to 7.10, is lost.
-#: Equation 7.7 is known, because section 7.2 repeats equation 7.7.
+#: Section 7.2 repeats equation 7.7, so 7.7 is not in this list.
 LOST_EQUATIONS = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -44,7 +44,7 @@ class Equation:
 
     Attributes:
         statement: The equation in plain characters.
-        definitions: Functions of `urdfkin.kinematics.equations` with the formula.
+        definitions: Names of functions in `urdfkin.kinematics.equations` that contain the formula.
         functions: Functions that compute the equation, as "module:name".
         tests: Tests that detect a wrong computation, as "file::name".
         oracle: Independent source of expected results.

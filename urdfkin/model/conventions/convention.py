@@ -156,7 +156,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse a convention's TOML text.
 
-    `name` is the default name and title.
+    `name` is the convention's name and title, unless the text contains them.
     """
     try:
         entries = tomllib.loads(text)

@@ -25,7 +25,7 @@ from urdfkin.model.conventions.convention import Convention, JointRule, check_un
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import parse_xml
 
-#: Largest allowed deviation from a mimic rule, rad or m.
+#: Allowed deviation from a mimic rule: this number * max(1, |`_TargetNumber.factor`|), in the target's unit.
 _MIMIC_TOLERANCE = 1e-9
 _ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]
 
@@ -580,7 +580,7 @@ class Conversion:
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 with v = M^-1 v_tool.
 
-        The column of a mimic joint is 0 if v_tool contains the mimicked joint.
+        In M^-1, the column of a mimic joint is 0 if v_tool contains the mimicked joint.
 
         Returns:
             (..., nv, program's nv) matrix.
@@ -595,9 +595,9 @@ class Conversion:
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the block of `matrix` for a planar or floating joint.
+        """Return the joint's part of `matrix`: (..., 3, 3) if planar, (..., 6, 6) if floating.
 
-        `q` is the robot's q. If the joint's own velocity v is given, return the block's time derivative.
+        `q` is the robot's q. With the joint's own velocity v, return the part's time derivative instead.
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -647,7 +647,7 @@ class Conversion:
     def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert the columns of a matrix J to the target program: J M^-1.
 
-        Each row must have the same meaning in both conventions.
+        Each row of J must have the same meaning in both conventions.
 
         Args:
             q: Configuration.
@@ -663,7 +663,7 @@ class Conversion:
         return array @ _add_frame_axis(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian of the target program to S J M.
+        """Convert the target program's Jacobian J to urdfkin's Jacobian S J M.
 
         The column of a mimic joint is added to the mimicked joint's column.
 
@@ -783,9 +783,9 @@ class Reordering:
 
 
 def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Find a `Reordering` that converts "q" or "v" between two conventions.
+    """Find the index, factor and zero that convert "q" or "v" between two conventions.
 
-    A reordering cannot convert angles to cosines, or change a velocity's frame.
+    A `Reordering` cannot convert angles to cosines, or change a velocity's frame.
 
     Returns:
         None if no reordering exists.
