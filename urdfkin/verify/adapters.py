@@ -49,7 +49,7 @@ class LibraryModel:
     """A robot that a library has read.
 
     Attributes:
-        joints: Joints with a coordinate, in the library's order.
+        joints: Names of the joints with a coordinate.
         poses: Returns the pose (4, 4) of each link relative to the root.
             The result contains no merged links.
     """

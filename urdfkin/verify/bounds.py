@@ -73,7 +73,7 @@ _NO_ROTATION = np.eye(3).ravel()
 #: First indices of position, velocities and accelerations in the state of a moving base.
 _BASE_VECTOR_INDICES = 9, 12, 15, 18, 21
 #: Number of configurations per block of the kernel `lengths`.
-#: A block fits into the L1 cache.
+#: The five bounds of one link need 2.5 kB per block, so those of several links fit into the L1 cache.
 _BLOCK_LENGTH = 64
 
 
@@ -104,7 +104,8 @@ def compute_magnitudes(
 ) -> Magnitudes:
     """Return upper bounds for all frames.
 
-    `base` (1 or n, 24) is the state of the base. Without v, only `p` and `roundings` are valid.
+    `base` is the result of `BaseMotion.state`: one row for all configurations, or n rows.
+    Without v, only `p` and `roundings` are valid.
     """
     n, lengths = len(q), _get_lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -188,10 +189,10 @@ class _MovingJoint(NamedTuple):
 
 
 class _FrameEnd(NamedTuple):
-    """The last part of a frame's path.
+    """The part of a frame's path after the last moving joint.
 
     Attributes:
-        step: Index of the last moving joint.
+        step: Index in `_Lengths.links` of the last moving joint on the path; -1: no moving joint.
         length: Length after this joint, m.
     """
 
@@ -250,12 +251,12 @@ def _translate_position(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Number of translations and number of rotations of each joint.
+#: Number of translations and number of rotations of a planar joint and of a floating joint.
 _FREE_JOINT_SIZES = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
 def _displacement(link: _MovingJoint, q: Any) -> Length:
-    """Return a bound on a joint's displacement."""
+    """Return an upper bound on the length of the joint's translation at q."""
     if link.kind != JointMotion.PRISMATIC:
         return _norm(q[link.q : link.q + _FREE_JOINT_SIZES[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.offset
@@ -650,7 +651,7 @@ def euler_jacobian_bound(bound: Bound, magnitudes: Magnitudes, axis_sine: FloatA
         additional joint in k: at least 24 eps (`PINOCCHIO_ROUNDINGS`) > 13 eps
     """
     s = axis_sine - EPS * magnitudes.roundings
-    # s is now a lower bound on the sine. If s is not positive, the scale becomes infinite.
+    # s is now a lower bound on |e_i x t|. If s is not positive, the scale becomes infinite.
     # The comparison accepts no result with an infinite scale.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
@@ -707,7 +708,7 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     For example, a joint (multiplier 1) and its mimic joint (multiplier -2) have the sum 3.
 
     Returns:
-        (frames, nv) for revolute joints, and (frames, nv) for prismatic joints.
+        Sums for rotations (frames, nv), and sums for translations (frames, nv).
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -727,8 +728,8 @@ def find_active_entries(
 ) -> NDArray[np.bool_]:
     """Find the Jacobian entries that can be nonzero.
 
-    False entries are 0 for every q. A base motion can change these entries in WORLD only. Only WORLD depends
-    on `root_at_origin`.
+    False entries are 0 for every q. In WORLD, a base motion can make a False entry nonzero, unless
+    `root_at_origin` is False. Only WORLD depends on `root_at_origin`.
 
         linear rows of a revolute joint: z x d
         WORLD: d leads from the joint to the world's origin

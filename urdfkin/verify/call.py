@@ -22,7 +22,7 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
-#: Array types that override no method of NumPy's arrays.
+#: Array types with the unchanged `reshape` of NumPy.
 _PLAIN_ARRAY_TYPES = np.ndarray, np.memmap
 
 
@@ -110,7 +110,8 @@ class Call:
     def flatten_out(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Flatten the batch axes of `out`.
 
-        A subclass other than `memmap` is invalid: its `reshape` may return another shape.
+        An `out` of a subclass other than `memmap` raises InputError.
+        The subclass's `reshape` may return another shape.
         With another shape, a kernel could write past the end of `out`.
         """
         if out is None:

@@ -265,7 +265,8 @@ class Account:
     Attributes:
         unchecked: Unchecked results of calls with checks.
         disabled_checks: Results of calls with verify=False.
-        counters: Pairs (array, index). A compiled function counts unchecked results in array[index].
+        counters: Pairs (array, index), one for each prepared function with verify=False.
+            array[index] is the number of results that the function has returned.
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)

@@ -1,7 +1,8 @@
 """Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes the
-differences, because NumPy takes as long as Pinocchio. The kernel and NumPy return equal numbers.
+`disagreement` defines the difference of two numbers. NumPy takes as long as Pinocchio to compute the
+differences. After some computing time, a compiled kernel therefore replaces NumPy. The kernel and NumPy
+return equal numbers.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ def compare_units(units: FloatArray, bound: Bound) -> BatchComparison:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The difference of unequal numbers is inf if the scale is 0. Numbers that are not finite also give inf.
+    The difference of unequal numbers is inf if the scale is 0.
+    The difference is also inf if a number or its scale is inf or NaN.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
     difference = np.abs(ours - theirs)
@@ -106,7 +108,7 @@ def worst_disagreements(ours: FloatArray, theirs: FloatArray, scale: FloatArray,
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If `size` has fewer than n rows, the kernel needs working memory.
+        # If `size` has fewer than n rows, the kernel uses these arrays as working memory.
         if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)

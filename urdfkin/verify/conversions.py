@@ -244,7 +244,7 @@ def _model_placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatA
 
 
 def _model_configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert the tree's q to the model's q.
+    """Convert q of urdfkin's tree to q of the `pinocchio.Model`.
 
     Joints are matched by name.
 
@@ -289,6 +289,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _orthogonality_defect(table: DHTable) -> float:
-    """Sum the Frobenius norms of R^T R - I."""
+    """Sum the Frobenius norms of R^T R - I for the rotations of the table's base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

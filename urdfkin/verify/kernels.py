@@ -64,7 +64,7 @@ def _largest_difference(ours, theirs, scale, i, k):
     """Compare two rows of finite numbers.
 
     Returns:
-        Largest difference, in units of eps * `scale[k]`.
+        Largest |ours[i, j] - theirs[i, j]| of all j, in units of eps * scale[k, j].
     """
     largest = 0.0
     for j in range(ours.shape[1]):
@@ -85,9 +85,9 @@ def _has_equal_triples(scale, k):
 
 @inline_function()
 def _divide_triples(ours, theirs, unit, width, units):
-    """Compare three rows with equal scales.
+    """Compare the rows x, y and z, which have equal scales.
 
-    units[j] = (largest |ours - theirs| in column j) / unit[j]
+    units[j] = (largest |ours - theirs| of x, y and z in column j) / unit[j]
     units[j] may be NaN or inf
     """
     for j in range(width):

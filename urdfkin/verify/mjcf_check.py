@@ -51,8 +51,8 @@ class MjcfReading:
     Attributes:
         remarks: Elements that the tree lacks.
         path: None for MJCF text.
-        shapes_refusal: Why MuJoCo rejects the complete file, or None. After a rejection,
-            MuJoCo reads the file without shapes and inertias.
+        shapes_refusal: None if the robot comes from the complete file. Otherwise, the robot comes from
+            the file without shapes and inertias. With check=True, the text is the reason.
     """
 
     urdf: str

@@ -62,7 +62,7 @@ def serve() -> None:
 def make_error_answer(error: Exception, what: str) -> dict[str, Any]:
     """Return an answer that describes `error`.
 
-    `what` is the message for exceptions of libraries.
+    `what` states the problem if a library, not urdfkin, raised `error`.
     """
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
@@ -88,7 +88,7 @@ def parse_answers(
     `status` is None if the process exceeded `timeout` (s).
 
     Returns:
-        The answers, and an explanation if an answer is missing.
+        All answers, and a text on the process's end. The text explains a missing answer.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -210,7 +210,7 @@ def _list_coordinates(model: Any, names: Sequence[str]) -> Iterator[tuple[str, t
     """Yield each joint's name, index in q and size.
 
     Pinocchio combines the joints `x` and `y` of a body into `Composite_x`.
-    Each combined joint has one number in q.
+    Each of the joints `x` and `y` has one number in Pinocchio's q.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

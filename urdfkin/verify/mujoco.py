@@ -268,7 +268,7 @@ class MujocoOracle(Oracle):
         """Return the placements of all frames.
 
         MuJoCo receives the first `count` of the inputs q, v and a.
-        `read(body, (k, f))` reads further results of sample k and frame f.
+        For each sample k and frame f, this method calls `read(body, (k, f))`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.find_index(name) for name in x.frames]
@@ -400,7 +400,7 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
 def _move_mass_to_root(model: Any, root: str) -> Any:
     """Move all mass to the root.
 
-    The centre of mass is then exactly the root's origin.
+    The model's centre of mass is then exactly the root's origin.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):

@@ -109,7 +109,7 @@ _COORDINATE_COUNTS = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 class _JointIndices(NamedTuple):
     """First indices of a joint.
 
-    A mimic joint has the `q` and `v` of the mimicked joint.
+    A mimic joint has the indices `q` and `v` of the mimicked joint.
 
     Attributes:
         sizes: (nq, nv) in Pinocchio.
@@ -130,7 +130,7 @@ class PinocchioLayout:
     """Converts between Pinocchio's and urdfkin's layouts.
 
     Attributes:
-        rate_columns: Pinocchio's Jacobian columns of moving joints, mimic joints included.
+        rate_columns: Column indices of moving joints in Pinocchio's Jacobian, mimic joints included.
     """
 
     def __init__(
@@ -449,8 +449,8 @@ class QueryBatch(NamedTuple):
     Pinocchio's functions for one and for several frames may round differently.
 
     Attributes:
-        frames_are_joints: Whether `frames` contains `JointFrame` objects.
-            Pinocchio then uses its functions for joints.
+        frames_are_joints: If True, `frames` contains `JointFrame` objects.
+            Pinocchio uses its functions for joints, such as `getJointJacobian`.
         is_partial: If True, Pinocchio uses its function for several frames even for one frame.
     """
 
@@ -478,7 +478,7 @@ class OracleQuery:
     """The user's arguments of one call.
 
     Args:
-        named_inputs: Texts or mappings; None for arrays.
+        named_inputs: A text, a mapping or None for each of q, v and a; None for an array.
         joints: Pairs (name, nv).
     """
 
@@ -499,7 +499,7 @@ class OracleQuery:
     def convert_inputs(self) -> None:
         """Convert the inputs before `out` changes.
 
-        The caller's `out` may share memory with an input.
+        An array in a mapping may share memory with `out`.
         """
         _ = self._inputs
 
@@ -681,8 +681,8 @@ def couple_columns(
     """Return the product J_full G.
 
     The kernel and NumPy return identical results.
-    `columns` lists the added columns of J_full, in this order.
-    Column i, multiplied by `factor[i]`, is added to column `index[i]`.
+    `columns` contains the column indices i of J_full, in the order of addition.
+    Column i, multiplied by `factor[i]`, is added to column `index[i]` of the product.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.get_kernel("coupling", module=KERNELS)) is None:

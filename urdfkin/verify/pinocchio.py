@@ -108,7 +108,7 @@ def _find_project(file: Path) -> tuple[str, str] | None:
 
 
 #: Bytes of stack for each link.
-#: The parser of Pinocchio 4.1.0 needs less than 4 kB per link.
+#: The parser of Pinocchio 4.1.0 needs less than 4 kB of stack per link.
 _STACK_BYTES_PER_LINK = 16_384
 #: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
 _SAFE_DEPTH = 100
@@ -332,8 +332,9 @@ class PinocchioOracle(Oracle):
         """Return Pinocchio's Hessians without two errors of Pinocchio 4.1.
 
         - The array has C order, but the numbers have Eigen's order: the first index varies fastest.
-        - In LOCAL, the derivative of a joint's column with respect to the same joint can be nonzero. The true
-          value is 0, because a joint's motion does not change the joint's own columns in the frame's axes.
+        - In LOCAL, Pinocchio's derivative of a joint's column with respect to the same joint can be nonzero.
+          The true value is 0, because a joint's motion does not change the joint's own columns in the frame's
+          axes.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._find_ids(x), self._convert_reference(x.reference), model.nv

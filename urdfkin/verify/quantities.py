@@ -58,12 +58,14 @@ class Quantity:
         blocks: `blocks(oracle, query)` yields the oracle's results in blocks.
         scale: `scale(plan, magnitudes, reference)` returns the scale of the bound.
         factors: Number of vectors in the longest product, for example 3 for w x (w x d).
-            `make_bound` adds 1 for LOCAL and WORLD.
+            `make_bound` adds 1 to `factors` for LOCAL and WORLD.
         results_and_bound: `results_and_bound(oracle, part, ours, library)` returns the oracle's results and
-            the bound. This function replaces `ask_oracle` and `scale`.
+            the bound. If it is not None, checks call it instead of `ask_oracle` and `scale`.
         compute_intervals: `compute_intervals(motion, link, reference)` returns intervals around true values.
-        recursive: True if one forward recursion computes the result from `inputs` alone.
-        in_validation: False for Hessians, which are nv times larger than Jacobians.
+        recursive: True if one forward recursion computes the result, without further arguments such as
+            `gravity`.
+        in_validation: Whether `validate` compares the quantity. False for Hessians, which are nv times
+            larger than Jacobians.
         object_kind: Compared objects: "frames", "joints" or "columns".
         heading: Column in reports; quantities can share a column.
     """

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Two products and one sum are at most 1, so each of these three values has an error of at most half an eps.
 _ROTATION_TOLERANCE = 9.0 * EPS
 #: Bound on the difference between two programs' normalised axes, per component.
-#: The length has an error of 2 eps.
+#: In each program, the relative error of the length is at most 2 eps.
 #: The quotient is rounded once.
 _AXIS_TOLERANCE = 5.0 * EPS
 #: Largest accepted difference between 1 and the length of yourdfpy's axis.
@@ -132,7 +132,7 @@ def _compare_joints(
     """Yield the differences between two joints.
 
     Yields:
-        Pairs (difference, known fault). The fault may be an empty text.
+        Pairs (difference, known fault). The fault is "" if the difference is not a known fault.
     """
     joint, parent, child = ours
     if theirs.type != joint.kind.value:

@@ -54,7 +54,7 @@ class SingularValues(Displayable):
     """Singular values of some rows of a Jacobian.
 
     Columns that are 0 in every configuration are left out. `print` and notebooks display a table. For a
-    single configuration, they also display `singularity()`.
+    single configuration, the text of `singularity()` follows the table.
 
     Attributes:
         rows: The chosen rows of the Jacobian, as a slice.
@@ -253,7 +253,7 @@ def _orthogonality_error(U: FloatArray) -> FloatArray:
 
 
 def _norm(E: FloatArray) -> FloatArray:
-    """Bound the Frobenius norm of non-negative matrices."""
+    """Return an upper bound on each matrix's Frobenius norm; all numbers of E are >= 0."""
     largest = E.max(axis=(-2, -1), initial=0.0)
     # A matrix that contains inf is not scaled, and the norm of this matrix is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
@@ -271,13 +271,13 @@ def _product(x: FloatArray) -> FloatArray:
 
 
 def _round_up(x: FloatArray) -> FloatArray:
-    """Return an upper bound on the exact number."""
+    """Return an upper bound on the exact number that was computed as x."""
     with np.errstate(over="ignore", under="ignore"):
         return np.nextafter(x + np.abs(x) * _RELATIVE_ERROR, np.inf)
 
 
 def _round_down(x: FloatArray) -> FloatArray:
-    """Return a lower bound on the exact number.
+    """Return a lower bound on the exact number that was computed as x.
 
     x = inf: the bound is the largest double
     """

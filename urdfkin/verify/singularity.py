@@ -49,7 +49,7 @@ class FrameJacobian:
         J: (..., 6, nv) Jacobian at the frame's origin, world axes.
         error: (..., 6, nv) bounds on the errors of J.
         is_revolute: (nv,) True: revolute joint. False: prismatic joint.
-            None: planar, floating or mimicked joint.
+            None: planar joint, floating joint, or joint that a mimic joint follows.
         active_entries: (6, nv) False for entries that are always 0.
         sample_jacobians: Function that returns Jacobians (n, 6, nv) at random configurations.
         moving_base: Whether a base motion is given.
@@ -83,9 +83,9 @@ class Singularity(Displayable):
         rank: Number of singular values with a lower bound above 0.
         full_rank: Largest possible rank, min(rows, columns).
         smallest_value_bound: Upper bound on the smallest singular value.
-        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin. Some
-            frames never move in some directions. If these directions depend on q or on a moving base, the
-            array is empty.
+        lost_directions: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin.
+            Directions in which the frame never moves are left out. If such directions depend on q or on a
+            moving base, the array is empty.
         null_motions: (e, nv) independent joint velocities that do not move the frame.
         reasons: Sentences about the lost directions and the reasons.
 
@@ -154,7 +154,7 @@ class _Explanation:
         directions = U[:, self._rank :].T
         directions = _orthonormal_basis(directions - directions @ never @ never.T)
         # If the Jacobian has more rows than columns, the frame never moves in some directions.
-        # If these directions depend on q, urdfkin cannot tell them from directions that are lost only here.
+        # If such a direction depends on q, it looks like a direction that is lost only at this q.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:

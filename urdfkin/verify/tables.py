@@ -240,7 +240,7 @@ def compute_relative_motion(
 
 @dataclass(frozen=True, slots=True)
 class ErrorScales:
-    """Factors in the bounds on rounding errors.
+    """Lengths, sums of |v| and |a|, and relative errors, for the bounds on rounding errors.
 
     Attributes:
         reach: (n,) reach, m; see the module's docstring.

@@ -179,7 +179,7 @@ class SinglePrecisionErrors:
     Attributes:
         links: (links, 2) largest position error (m), angle error (rad), over all configurations.
         joints: (joints, 3) position error (m), angle error (rad), relative error of the mimic rule.
-            Columns 0 and 1: pose of the child link relative to the parent link, at q = 0.
+            Columns 0 and 1: errors of the child link's pose relative to the parent link, at q = 0.
     """
 
     links: FloatArray

@@ -84,7 +84,8 @@ def _describe_joint(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # `ends` is None for a joint with several free directions.
+        # The limits `ends` are None for a joint with several free directions.
+        ends = own.get(free.lower())
     factor = np.pi / 180.0 if free.startswith("rot") else read.meters_per_unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)

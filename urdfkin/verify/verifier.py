@@ -72,8 +72,8 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks and records the results of a robot.
 
-    Another oracle checks only the results of methods. Tables, accuracy studies and enclosures are always
-    checked by Pinocchio.
+    `oracle` checks only the results of the methods of `Robot`. Pinocchio always checks tables, accuracy
+    studies and enclosures.
 
     Args:
         unverifiable: Why Pinocchio cannot check the robot.
@@ -262,7 +262,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Compare a part of a call with the oracle."""
+        """Compare the configurations `part` of a call with the oracle."""
         x = call.select(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -456,7 +456,7 @@ def as_verify(verify: object) -> Verify:
 def split_into_parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of checked configurations in parts.
 
-    The sample is random, because a regular sample may be biased.
+    With "sample", the configurations are random, because a regular choice may be biased.
     `numbers` is the number of values for one configuration.
     """
     step = min(_MAX_CONFIGURATIONS, max(1, _MAX_VALUES // max(1, numbers)))

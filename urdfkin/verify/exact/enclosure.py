@@ -63,7 +63,7 @@ class Enclosure:
         """The difference `upper - lower` of each interval.
 
         The width is 0 only if the true value is a double.
-        Otherwise, the width is at least the distance between two neighbouring doubles.
+        A width above 0 is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 

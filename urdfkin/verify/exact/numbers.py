@@ -44,7 +44,7 @@ _ADDITIONAL_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT_DIGITS = 17
 #: Number of digits of intermediate results in `format_decimal`.
-#: The decimal is then rounded to 17 digits.
+#: `format_decimal` then rounds the decimal to 17 digits.
 _CONVERSION_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _NEWTON_BITS = 30
@@ -53,9 +53,9 @@ _precision_lock = make_fork_safe_lock()
 
 
 def enough_digits(joints: int) -> int:
-    """Return the number of digits for a path.
+    """Return the number of decimal digits for intervals on a path with `joints` joints.
 
-    An interval is then narrower than the last digit of a double.
+    With this number, an interval is narrower than the last digit of a double.
     One more digit makes an interval ten times narrower.
     A joint with an oblique axis makes an interval about twice as wide.
     """
@@ -83,7 +83,7 @@ def as_interval(value: Number) -> Number:
 def interval_ends(x: Number) -> tuple[float, float]:
     """Return both ends, rounded outward to doubles."""
     # An integer is exact and needs no rounding.
-    # This shortcut saves time: most results are the integer 0.
+    # This shortcut saves time, because x is usually the integer 0.
     if isinstance(x, int):
         return float(x), float(x)
     return _round_outward(x.lower(), -math.inf), _round_outward(x.upper(), math.inf)
@@ -352,7 +352,7 @@ class _ValueBound(NamedTuple):
     Attributes:
         scaled_coordinate: |M q|.
         offset: Sum of |c| over the terms c of C.
-        error: Rounding error, eps. A program applies the rules one after the other.
+        error: Rounding error in eps, if the rules are applied one after the other.
     """
 
     scaled_coordinate: Any

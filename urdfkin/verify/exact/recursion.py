@@ -30,7 +30,7 @@ from urdfkin.verify.oracle import BaseNumbers
 _RECURSION = Recursion(equations)
 
 #: Axis of each velocity of a planar or floating joint.
-#: First entry: axis of the child link, 0 for x, 1 for y, 2 for z.
+#: First entry: 0, 1 or 2 for the x-, y- or z-axis of the child link.
 #: Second entry: True for an angular velocity.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
@@ -51,7 +51,7 @@ def make_base_state(base: BaseNumbers) -> LinkState:
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
-    """The motion of links, and Jacobian columns. The keys are link indices."""
+    """The motion of links, and Jacobian columns, as intervals. The keys are link indices."""
 
     states: Mapping[int, LinkState]
     columns: Mapping[int, tuple[Column, ...]]
