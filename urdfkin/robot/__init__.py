@@ -1506,10 +1506,11 @@ class Robot(Displayable):
                 joint's origin in the URDF. "minimal": the axis passes through the origin of a neighbouring
                 revolute joint, so the length a between the two axes is 0. The previous joint is used only if
                 the next joint is not revolute.
-            like: A published table. The result copies the positive joint directions and the directions of the
-                x axes from this table. The result also copies the offsets d along parallel axes, and the
-                zero positions of the first and the last joint. All other numbers come from the URDF. With
-                `like`, `flip`, `first`, `last`, `sign` and `parallel_offset` must have their default values.
+            like: A published table. The result copies the positive joint directions, the directions of the x
+                axes, and the offsets d along parallel axes from this table. The result also copies theta of
+                the first and last row, and a and alpha of a standard table's last row. All other numbers come
+                from the URDF. With `like`, `flip`, `first`, `last`, `sign` and `parallel_offset` must have
+                their default values.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
