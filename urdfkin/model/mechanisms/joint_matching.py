@@ -151,7 +151,7 @@ class JointMatcher:
     ) -> list[Edge]:
         """Return the joints of B, most similar to `e` first.
 
-        X (4, 4) moves B before the comparison. Joints that the user matched are omitted.
+        X (4, 4) moves B before the comparison. Joints named in `name_map` are omitted.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -207,7 +207,13 @@ class JointMatcher:
         """Return the difference of two joint axes.
 
         Returns:
-            Angle (rad) and distance (m); (0, 0) for different kinds of joints.
+            Angle (rad) and distance (m):
+
+                revolute joints:             between the axes
+                prismatic joints:            angle between the axes, 0
+                planar joints:               angle between the normals, 0
+                floating joints:             0, 0
+                different kinds of joints:   0, 0
         """
         kind = motion_type(self.a.joint(e).kind)
         if kind != motion_type(self.b.joint(f).kind):
@@ -278,10 +284,7 @@ class Axis:
 
 
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
-    """Yield joint values (rad or m) that may move `axis_b` to `axis_a`.
-
-    The axis of the joint is u.
-    """
+    """Yield values (rad or m) of the joint with the axis u that may move `axis_b` to `axis_a`."""
     if not turns:
         heights = axis_a.height(u.direction), axis_b.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -304,9 +307,9 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of joint axes after the given joints: one axis of A and one of B.
+    """Yield pairs of axes: an axis of A after the joint `via[0]`, and an axis of B after the joint `via[1]`.
 
-    A branch ends at the first axis of A that is not parallel to A's reference line.
+    A branch stops after the first axis of A that is not parallel to `reference[0]`.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -320,7 +323,7 @@ def later_axes(
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align an axis of B with an axis of A.
 
-    If no other axis determines the rotation about this axis or the shift along this axis, the value is 0.
+    The rotation about this axis is 0 if no other axis determines it. The same holds for the shift along it.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
@@ -342,6 +345,7 @@ def root_poses_by_siblings(
     """Yield poses of B's root that align up to three joint axes of one body.
 
     If these axes do not determine the shift along the first axis, later axes determine it.
+    If no later axis determines this shift, the shift is 0.
     """
     edges = _with_axes(a, bodies[0])
     axes_a = [_axis(a, edge) for edge in edges]
@@ -367,7 +371,7 @@ def root_poses_by_siblings(
                 pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
-            # The axes of the next joints must determine the shift along u.
+            # The axes after the prismatic joint can determine the shift along u.
             if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
@@ -397,9 +401,10 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """For each branch of A and each branch of B, return the first pair of revolute axes.
+    """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
     Each item is (pair, prismatic pairs before the pair, pairs from `later_axes`).
+    Every pair contains an axis of A and an axis of B.
     Without a revolute pair, `pair` is the last prismatic pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
@@ -437,7 +442,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 
 #: Function that proposes poses of the next body of B.
 #: The first argument contains the next bodies of A and B.
-#: The second argument contains the matched joints from the current to the next bodies.
+#: The second argument is one joint of A and one joint of B: the joints before the next bodies.
 #: The third argument is the pose of B's current body.
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
@@ -453,7 +458,8 @@ class _Match:
     """The result of an exact match of two subtrees.
 
     Attributes:
-        X: (4, 4) pose of B's body after the two joints.
+        X: (4, 4) motion that moves B's body after the joint to A's body after the joint,
+            in the zero configuration.
     """
 
     X: FloatArray
@@ -482,15 +488,15 @@ class SubtreeMatcher:
     def joint_pairs(
         self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
     ) -> Sequence[EdgePair] | None:
-        """Return the joint pairs of two subtrees that match exactly.
+        """Return pairs of the joints at two bodies; None if the bodies' subtrees do not match exactly.
 
-        X (4, 4) moves B before the comparison. The result is None without an exact match.
+        X (4, 4) moves B before the comparison.
         """
         found = self._match_bodies(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after joint f; None without an exact match."""
+        """Return `_Match.X` for the bodies after the joints e and f; None without an exact match."""
         found = self._match_subtrees(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -571,7 +577,7 @@ class SubtreeMatcher:
     def _merge_ratios(self, some: VelocityRatios, others: VelocityRatios) -> VelocityRatios | None:
         """Merge two sets of matched coordinates.
 
-        The result is None if the sets contradict each other.
+        The result is None if a coordinate has two different partners or two different ratios.
         """
         for x in some.keys() & others.keys():
             (y, ratio), (other, other_ratio) = some[x], others[x]
@@ -588,9 +594,9 @@ class SubtreeMatcher:
         return self.tolerance.holds(*self.joint_matcher.mismatch(e, f, IDENTITY, X))
 
     def _is_same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint can move the pose X to `other`.
+        """Return whether a motion of A's joint e can move B from the pose X to `other`.
 
-        For a planar joint, the two poses must be equal.
+        For a planar joint, the result is true only if X equals `other`.
         """
         kind = self.a.joint(e).kind
         if kind.nq > 1:

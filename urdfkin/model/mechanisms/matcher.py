@@ -93,9 +93,11 @@ class BodyPair:
 
     Attributes:
         via: The joints of A and of B before the bodies; None at the first bodies.
-        previous: Index of the previous joint pair, or -1.
-        G: (4, 4) motion of A's body; a link of A is compared at G @ zero_pose.
-        XC: (4, 4) motion of B's body; a link of B is compared at XC @ zero_pose.
+        previous: Index in `Alignment.steps` of the joint pair before the bodies.
+            -1 at the first bodies, in `_score_ahead` and in `_poses_after`.
+        G: (4, 4) product of the motions L at earlier joints.
+        XC: (4, 4) motion of B's body by the root pose, and by earlier zero offsets and conversions.
+            The matcher compares G @ (zero pose of A's link) with XC @ (zero pose of B's link).
     """
 
     bodies: tuple[int, int]
@@ -183,7 +185,7 @@ class MechanismMatcher:
         """Return an upper bound on the number of matches from the bodies `base`.
 
         Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
-        The sum of the bounds is largest if the branches are paired in the order of their sizes.
+        The sum of min(m, n) is largest if the branches of each model are sorted by m or n.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -316,7 +318,11 @@ class MechanismMatcher:
             )
 
     def _pair_of_tools(self, body_pair: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Pair two links whose labels occur in one model only."""
+        """Pair a link of A with a link of B as end-effector frames.
+
+        Each label occurs in one model only.
+        The result is None if no such links exist, or if other links of the bodies are matched.
+        """
         links_a, links_b = self._own_links(body_pair)
         if matched or not links_a or not links_b:
             return None
@@ -424,7 +430,8 @@ class MechanismMatcher:
         N, moved, score = self._best(body_pairs, depth)
         # P_a and P_b are the joint's poses in A and B.
         # P_b = M P_a N.
-        # For a path from child to parent, both poses are inverted.
+        # If A's path crosses the joint from child to parent, P_a is inverted.
+        # If B's path crosses the joint from child to parent, P_b is inverted.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (
             IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
@@ -441,9 +448,8 @@ class MechanismMatcher:
         plane: FloatArray | None,
         poses_after: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
-        """Yield candidates for the rigid motion N.
+        """Yield candidates for the rigid motion N in P_b = M P_a N; see the module `mechanism`.
 
-        The module `mechanism` defines N.
         `plane` is one possible N of a planar joint, and None for a floating joint.
         `pose_a` includes the motion G.
         """
@@ -508,7 +514,7 @@ class MechanismMatcher:
     def _zero_choice(self, joint: str) -> tuple[int, float | None]:
         """Return a joint's sign and zero offset from `choices`.
 
-        Without `choices`, the result is (0, None).
+        If `choices` is None, the result is (0, None).
         """
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
@@ -633,7 +639,7 @@ def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> li
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
-    """Make the planes of two joints parallel.
+    """Return the smallest rotation of A's planar joint that makes its plane parallel to B's plane.
 
     Returns:
         Smallest rotation (4, 4), its angle (rad), and the shift 0.
@@ -644,7 +650,8 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
     )
 
 
-#: Maximum number of joint orders that are tried; five prismatic joints have 120 orders.
+#: Maximum number of orders that are tried for each run of consecutive joints of B.
+#: Five prismatic joints have 120 orders.
 MOST_ORDERS = 120
 #: Maximum number of later joint pairs that a search compares; see `LookAhead`.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
@@ -768,8 +775,8 @@ def _best_alignment(
 #: To fit the zero offset of a revolute joint to the mimic rules, urdfkin tries to add 0, 1 or -1 full turns.
 FULL_TURNS = (0, 1, -1)
 #: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
-#: as a multiple of the angle tolerance. A zero offset is computed from the axes of two joints.
-#: The zero offset is inexact if these axes are close to each other.
+#: as a multiple of the angle tolerance. A zero offset that is computed from the axes of the joint
+#: and of a later joint is inexact if the two axes are nearly the same line.
 OFFSET_FACTOR = 1e4
 
 
@@ -802,7 +809,7 @@ class _Rule:
     has_effect: bool
 
     def beta_for(self, turn: int) -> float:
-        """Return beta after `turn` full turns are added to o."""
+        """Return beta for the zero offset o + 2 pi `turn`."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def offset_for(self, beta: float) -> float:

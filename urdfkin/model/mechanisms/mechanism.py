@@ -31,8 +31,8 @@ displaced, S' differs from S. The link poses of A and B are then
 Each L is expressed in A's root frame, with A in the zero configuration. If A and B agree at joint i, then
 S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree at all joints and links, the two models have
 the same motion. If A and B differ at a joint or link, the motions of the two models usually differ. There are
-exceptions, for example two consecutive revolute joints whose axes are the same line. The poses of the links
-after such joints depend only on the sum of the two angles.
+exceptions. For example, two consecutive revolute joints with the same line as axis move the later links by
+the sum of the two angles.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
@@ -209,7 +209,7 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
 
 
 def planar_angle(P: FloatArray) -> FloatArray:
-    """Return the angle (rad) of the rotation about z that is nearest to P."""
+    """Return the angle (rad) of the rotation about z that is nearest to the rotation of the pose P."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
@@ -220,10 +220,10 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
 def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a motion N for which M P N is planar for every planar pose P.
 
-    M must keep or reverse the normal of the plane.
+    The rotation of M must map the plane's normal z to z or -z.
 
-        normal kept:       (M, N) = (E T, T^-1)
-        normal reversed:   (M, N) = (E T F, F T^-1)
+        z maps to z:       M = E T,      N = T^-1
+        z maps to -z:      M = E T F,    N = F T^-1
         E: motion in the plane;  T: translation along the normal;  F: half a turn about x
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
@@ -265,7 +265,7 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating_joints: Indices of fixed joints that move in the other model.
+        separating_joints: Indices in `tree.joints` of fixed joints that move in the other model.
         labels: Label of each link, by default its name. Links with equal labels are paired.
 
     Attributes:
@@ -308,7 +308,7 @@ class Mechanism:
         return known
 
     def reorder(self, names: Sequence[str]) -> Mechanism:
-        """Return a copy with consecutive joints in another order.
+        """Return a copy of the mechanism with the joints `names` in this order.
 
         `allows_order` must be true. Links whose pose depends on the order are omitted.
         """
@@ -348,8 +348,9 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_by_body[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield the joint orders with the same motion, for each run of consecutive joints.
+        """Yield one iterator for each run of consecutive joints.
 
+        The iterator yields the orders of the run's joint names that give the same motion.
         The current order comes first.
         """
         run: list[Edge] = []
@@ -370,10 +371,14 @@ class Mechanism:
                     yield [self.joint(edge).name, *others]
 
     def _commute(self, one: Edge, other: Edge, tolerance: Tolerance) -> bool:
-        """Return whether two joints commute.
+        """Return whether two joints of the mechanism commute.
 
-        Two prismatic joints always commute. Two revolute joints need axes on the same line.
-        A revolute and a prismatic joint need parallel axes.
+        The kinds of the joints decide:
+
+            two prismatic joints:                always
+            two revolute joints:                 if their axes are the same line
+            a revolute and a prismatic joint:    if their axes are parallel
+            all other joints:                    never
         """
         kinds = [self.joint(edge).kind for edge in (one, other)]
         if not all(kind.has_axis and kind.nv for kind in kinds):
@@ -439,7 +444,7 @@ def line_difference(s: Screw, t: Screw, *, with_distance: bool) -> tuple[float, 
     Opposite directions count as parallel.
 
     Returns:
-        Angle (rad), and distance (m) of `s.point` from `t`.
+        Angle (rad) between s and t. Distance (m) of `s.point` from the line t; 0 without `with_distance`.
     """
     ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
@@ -470,12 +475,22 @@ class MatchedJoints:
         previous: Index of the previous joint pair on the path from the base, or -1.
         sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
-        before: Rigid motion L (4, 4) before B's joint.
+        before: Rigid motion L (4, 4); B's joint moves the bodies after it by L exp(S' t').
         axis_a: Screw S; exp(S t) moves the bodies after the joint.
             If A's joint is fixed, `axis_a` is the screw of B's joint.
-        axis_b: Screw S'. If S' = S, `axis_b` is the same object as `axis_a`.
-        tilt: Angle between axes, or between normals of planar joints, rad.
-        shift: Distance between axes, or between origins of planar or floating joints, m.
+        axis_b: B's screw S' in A's root frame. If S' = S, `axis_b` is the same object as `axis_a`.
+        tilt: Angle (rad), 0 within the tolerance.
+        shift: Distance (m), 0 within the tolerance.
+
+            joints                              tilt                        shift
+            revolute                            between the axes            between the axes
+            prismatic                           between the axes            0
+            planar                              between the normals         0
+            floating                            0                           0
+            planar or floating,                 between the joint frames    between their origins
+            `choices` without a conversion
+            one fixed joint, different kinds    0                           0
+
         kind_difference:
             "a":     only A's joint is fixed
             "b":     only B's joint is fixed
@@ -530,7 +545,10 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy that stores the frames' difference in `tool`."""
+        """Return a copy with the frames' difference in `tool`.
+
+        In the copy, `end` is the identity, and `tilt` and `shift` are 0.
+        """
         tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -610,8 +628,8 @@ class Alignment:
         """Yield two joint pairs whose partners can be exchanged.
 
         Both pairs have the same kind and the same previous pair.
-        Each joint pair differs, or a later joint pair or link pair differs.
-        The names of A's two joints occur neither in B nor in `name_map`.
+        Each of the two pairs, or a joint pair or link pair after it, differs.
+        In both pairs, the name of A's joint is neither a joint name of B nor a key of `name_map`.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -625,7 +643,7 @@ class Alignment:
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
         """Return a `FramePair` for each pair of link indices.
 
-        A pair is omitted if its two bodies have no matched links.
+        A pair is omitted if no link of A's body is matched with a link of B's body.
         """
         matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
@@ -680,8 +698,7 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: With these prescribed values, A and B have equal root poses.
-#: The coordinates of each joint are also equal in A and B.
+#: `AS_WRITTEN` prescribes equal root poses and equal joint coordinates for A and B.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -711,12 +728,12 @@ class LinearFunction:
 class MatchedValues:
     """The values of two matched joints.
 
-    Both have the positive direction and zero of A's joint.
+    The functions `a` and `b` use the positive direction and the zero of A's joint.
     """
 
     a: LinearFunction
     b: LinearFunction
-    #: Joint value of B before the conversion: b_unconverted = sense * b + offset.
+    #: Value in the positive direction and zero of B's own joint: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
     #: `rounding` (rad or m) is then max(0, D - E).

@@ -30,8 +30,8 @@ is proportional to the square of the distance between grid points.
 
 urdfkin computes the maxima from the support functions of y and d. If A and B differ at several joints, the
 terms of these joints may be largest in different configurations. The sum of the maxima then exceeds the true
-maximum. A second bound is the sum of upper bounds on the displacements by the motions L. The second bound
-holds if the joints of A and B have equal axes and equal values. The result is the smaller bound.
+maximum. A second bound is the sum of upper bounds on the displacements by the motions L. This sum is valid
+if all matched joints have equal axes and equal values. The result is the smaller bound.
 
 **Second derivatives.** The function `curvature` computes bounds joint by joint, from the frame to the base.
 
@@ -154,7 +154,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function after all rotations from `low` to `high` (rad)."""
+        """Return the maximum of h over all rotations about `screw` from `low` to `high` (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -162,7 +162,9 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotate_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return h after each rotation of the set of points.
+        """Return h after the rotation of the set of points by each of the angles.
+
+        The axis of the rotation contains the origin.
 
             result:             h(along + factor R^T across)
             along + across:     a grid point's parts along and perpendicular to the axis
@@ -182,7 +184,7 @@ class Support:
         return self.evaluate(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function after all translations from `low` to `high` (m)."""
+        """Return the maximum of h over all translations along `direction` from `low` to `high` (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -242,9 +244,8 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: `FINE_GRID` gives smaller bounds than `COARSE_GRID`, but takes longer.
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
-#: Maximum number of sample values of a revolute joint's variable.
-#: Maximum number of samples of a joint's range.
-#: If a range needs more samples, the joint's angles in A and B are treated as independent.
+#: Maximum number of intervals between the samples of a revolute joint's variable.
+#: If a range needs more intervals, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -397,9 +398,11 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of p' - p.
+    """Return the support function of p' - p for two matched prismatic joints.
 
-    The vectors p and p' are the translations in A and B.
+        p  = t u:     translation by A's joint
+        p' = t' u':   translation by B's joint
+
     The difference is largest if each joint value is at a limit.
     """
     if (name := pair.variable) is not None:
@@ -420,8 +423,11 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
     """Return samples of the variable that moves two matched revolute joints.
 
     Returns:
-        (n,) samples. None for two variables, for too many samples, or for an infinite range
-        with a slope other than 0, 1 and -1.
+        (n,) samples, or None in these cases:
+
+            A's and B's joints have different variables
+            the range needs more than `MOST_VALUES` intervals
+            the range is infinite, and a slope is not 0, 1 or -1
     """
     if (name := pair.variable) is None:
         return None
@@ -494,9 +500,9 @@ def _independent_difference(
 
     Definitions and bounds:
 
-        equal axes:       r:  radius of a point's circle in A and B
-                          a:  largest difference of the angles, at most pi
-                          distance <= chord 2 r sin(a/2)
+        equal axes:       |e(S' t') y - e(S t) y| <= 2 r sin(a/2)
+                          r:  largest distance of y from the axis
+                          a:  largest |t' - t|, at most pi
 
         different axes:   h = (h of e(S' t') y) + (h of -e(S t) y)
     """
@@ -519,13 +525,15 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return upper bounds on the second derivatives of D with respect to the variables.
+    """Return upper bounds on the lengths of the second derivatives of D for each pair of variables.
+
+        D = p_B - p_A:   difference of the frame's positions in A and B
 
     All bounds are inf if paired joints have different variables or slopes.
     Pairs without effect on D are ignored.
 
     Returns:
-        n names of variables, and (n, n) bounds (m).
+        n names of variables, and (n, n) bounds (m, divided by the units of both variables).
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
@@ -577,7 +585,7 @@ def _pass_to_front(
 ) -> float:
     """Return an upper bound on the length of d at the base.
 
-    `vectors` contains d and y at the last joint, without the motion L of this joint.
+    `vectors` contains the support functions of d and y before the motion L of `steps[-1]` is applied.
     """
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
@@ -603,9 +611,12 @@ def _derivatives(
 
 
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x (y - o').
+    """Return upper bounds on the support functions of two derivatives.
 
-    The bound on u x d includes (u' - u) x (Y - o') and u x (o - o').
+        d_i = u x d + (u' - u) x (y - o') + u x (o - o')
+        y_i = u' x (y - o')
+
+    The arguments d and y are given after the joint's motion; x is the cross product.
     """
     G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
@@ -634,8 +645,8 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints that affect the length of D, with their values.
 
-    The result begins at the first difference, or at an earlier joint that shares
-    a variable with later joints.
+    The result begins at the first joint that differs. If an earlier joint shares a variable with
+    a joint of the result, the result begins at the earlier joint.
     """
     steps, pairs = (
         alignment.path(frame.previous),
