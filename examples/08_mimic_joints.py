@@ -1,6 +1,6 @@
 """Compute with mimic joints: one finger of a gripper mimics the other finger.
 
-The vector `q` contains no mimic joints. In the Jacobian, the column of the mimicked joint
+You learn that the vector `q` contains no mimic joints. In the Jacobian, the column of the mimicked joint
 includes the motion of the mimic joint. With `mimic=False`, mimic joints are independent joints.
 """
 
