@@ -55,11 +55,11 @@ _MAX_DISPLAYED = 2
 class AccelerationBreakdown(Displayable):
     """Contributions of the joints to a frame's acceleration.
 
-    Six numbers are [linear; angular], m/s^2 and rad/s^2.
+    Six numbers are a classical acceleration [linear; angular], m/s^2 and rad/s^2.
 
     Attributes:
         joints: Moving joints from the base to the frame.
-        base: (..., 6) contribution of the base's motion.
+        base: (..., 6) part of the acceleration due to the base's motion.
         terms: (..., joints, 4, 6) contributions; `ACCELERATION_KINDS` names the four kinds.
     """
 
@@ -218,7 +218,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _joint_translation(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's translation in the joint's axes."""
+    """Return the translation of a prismatic, planar or floating joint, in the joint's axes."""
     translation = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:

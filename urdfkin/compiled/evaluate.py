@@ -288,7 +288,7 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Minimum size of a batch that uses several threads.
+#: Minimum size of a batch that uses several threads by default.
 #: Starting a thread takes about ten microseconds.
 _MIN_THREADED_ROWS = 4096
 

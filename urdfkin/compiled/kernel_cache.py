@@ -22,7 +22,7 @@ from urdfkin.system.locks import import_lock, make_fork_safe_lock
 #: A fork waits for this lock, because a child cannot finish the parent's compilation.
 #: A fork acquires locks in the reverse order of their creation.
 #: The import of Numba acquires this lock before `logging`'s lock.
-#: `logging`'s lock must therefore be created before this lock.
+#: Therefore, import `logging` before the creation of this lock.
 compile_lock = make_fork_safe_lock()
 
 #: A function that receives a kernel's name and compile time (s).

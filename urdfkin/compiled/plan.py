@@ -100,8 +100,8 @@ class CompiledTree:
     | tilts | (frames,) | sum of `Joint.tilt` (rad) over these URDF joints, in output order |
 
     `sum_columns`: joints with the same index in v share the column of the first joint on the path.
-    `lengths`: a path begins at the previous moving joint or at the base. The length of a path is the sum of
-    `Joint.length` over the following joints, fixed joints included.
+    `lengths`: sum of `Joint.length` over the joints after the previous moving joint, fixed joints included.
+    Without a previous moving joint, the sum begins at the base.
     """
 
     nq: int
@@ -347,7 +347,7 @@ INSTRUCTION_WIDTH = 5
 #: 0: scratch row of the angle,
 #: 1: scratch row of the sine,
 #: 2: index of the mimic rule,
-#: 3: 1 if the mimic rule changes the angle.
+#: 3: 0 if the angle is q, 1 if the angle is multiplier * q + offset.
 ANGLE_WIDTH = 4
 #: Scratch rows. Row 0: number 0. Row 1: number 1.
 #: Rows 2 to 17: results of a frame. Row 18: a joint angle.
@@ -469,7 +469,7 @@ class _ProgramWriter:
         Yields:
             joint: (previous moving joint, joint, None)
             frame: (last moving joint, None, frame)
-            -1: the base
+            -1 instead of a moving joint: the base
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -480,9 +480,9 @@ class _ProgramWriter:
                 f += 1
 
     def _save_if_reused(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state of `step` if an event after `following` needs the state.
+        """Save the state of `step` if an event after the next event needs the state.
 
-        At the event `following`, the state is still in the registers.
+        `following` is the index of the next event. At this event, the state is still in the registers.
         """
         if last.get(step, -1) > following:
             self._add_instruction(Op.SAVE, self._state_row(step))
@@ -539,7 +539,7 @@ class _ProgramWriter:
         )
 
     def _add_frame(self, f: int) -> bool:
-        """Return whether the last joint's state is overwritten."""
+        """Add a frame's instructions; return whether they change the state in the registers."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._add_transform(offsets[:9].reshape(3, 3), offsets[9:], orientations=self.orientations)
         sources = 0
@@ -584,7 +584,7 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _block_starts(indices: Sequence[int]) -> list[int]:
-    """Return multiples of 8, for example [0, 8] for the indices [3, 5, 12]."""
+    """Return the starts of the needed blocks of eight: [0, 8] for the indices [3, 5, 12]."""
     return sorted({int(index) // 8 * 8 for index in indices})
 
 

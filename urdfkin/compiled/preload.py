@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import subprocess
 
 #: After these times (s) in plain Python, this module loads or compiles a kernel.
-#: The table in the module's docstring lists the action for each time.
+#: The module's docstring describes the action after each of these times.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
 #: Each further kernel is loaded when plain Python has taken this time (s).

@@ -179,7 +179,7 @@ class ConstantNumber:
 
 
 def _double(x: Any) -> float:
-    """Convert a number to a float, except `unused()`."""
+    """Convert a number to a float; the number must not be `unused()`."""
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is ConstantNumber else x)

@@ -301,8 +301,8 @@ def _restore_state(s, row, state):
 def _read_blocks(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read whole blocks of eight numbers, which is faster.
 
-    For example, if nq is 6, the function may read eight numbers. The last two numbers go to rows of v.
-    The recursion then reads v into these rows, or does not use these rows.
+    For example, if nq is 6, the function may read eight numbers. The two additional numbers go to the
+    scratch rows of v. If the recursion needs these rows, v overwrites the two numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -335,7 +335,7 @@ def _base_state(axes, m, s, args, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute all sines and cosines before the recursion, which needs all registers."""
+    """Compute all sines and cosines first, because the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _joint_coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)

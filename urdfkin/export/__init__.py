@@ -37,7 +37,7 @@ def code_in(code: FrameCode, to: str) -> FrameCode:
 def write(code: FrameCode, to: str, file: str | None = None) -> str:
     """Return an exported file's text with its digest.
 
-    `file` is the file name in the comments.
+    `file`, for example `arm.c`, replaces the default file name in the text.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

@@ -159,7 +159,7 @@ def advance_pointers(code: FrameCode, function: Function) -> str:
 class InputLayout:
     """Layout of the C array `in`.
 
-    The order is inputs that are not angles, input angles, computed angles, sines, cosines.
+    Order: other inputs, input angles, computed angles, sines of all angles, cosines of all angles.
     """
 
     def __init__(self, function: Function) -> None:

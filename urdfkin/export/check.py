@@ -38,7 +38,7 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: Compiler and options for a CUDA file on a computer with a GPU.
+#: Compiler and options for `.cuh` if the computer has nvcc and a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000

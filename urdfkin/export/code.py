@@ -33,7 +33,7 @@ class FrameCode:
     No name can end a comment.
 
     Attributes:
-        identifiers: Names of input numbers ("q", "v", "a") and joints ("s").
+        identifiers: Names of the coordinates ("q"), velocities ("v", "a") and joints ("s").
         maybe_proof: None for code that is not exported.
         exact: Returns code with exact constants.
     """

@@ -203,7 +203,7 @@ class CompiledFrame:
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape or a number that is not finite is
     an error. The machine code is compared with Pinocchio once, on more than a hundred configurations. After
-    `load(verify=False)`, this comparison is omitted. `Robot.certificate` reports the results of later calls
+    `load(verify=False)`, this comparison is omitted. `Robot.certificate` reports the results of all calls
     as unchecked.
 
     Attributes:
@@ -406,7 +406,7 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether the machine code can use all arguments without conversion.
 
-        For a large batch, the conversion takes 10 % of the time.
+        For a large batch, the conversion in `Call` takes 10 % of the time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

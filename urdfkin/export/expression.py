@@ -176,7 +176,7 @@ def _equals(x: Number, value: float) -> bool:
 
 
 def _negated_operand(x: Number) -> Number:
-    """Return -x for a negation or negative constant x.
+    """Return y if x is the expression -y or the negative constant -y.
 
     Otherwise return None.
     """

@@ -50,7 +50,7 @@ INPUT_LETTERS = ("q", "v", "a")
 _ASSIGNED_OPERATIONS = ("sin", "cos", "sqrt", "/")
 #: Maximum number of operations in a statement.
 _MAX_OPERATIONS = 12
-#: Maximum number of results in one backward pass, to limit memory.
+#: Maximum number of results whose derivatives are computed together, to limit memory.
 _MAX_RESULTS = 512
 
 

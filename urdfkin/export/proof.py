@@ -234,7 +234,7 @@ def _find_tolerances(
 def format_decimal(x: Number) -> str:
     """Return an interval as decimal text.
 
-    An interval that contains 0 becomes "0.0".
+    If the interval contains 0, the text is "0.0".
     """
     ball = as_interval(x)
     if ball.contains(0):
@@ -252,7 +252,7 @@ def _round_up(x: float) -> str:
     """Round a bound up.
 
     A smaller bound could reject a correct result.
-    For example, the rounding error of a constant can be equal to the bound.
+    For example, a rounded constant's error can be exactly the bound.
     """
     return _round(x, 7, ROUND_CEILING)
 

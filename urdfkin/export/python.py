@@ -26,7 +26,7 @@ class Dialect:
 
     Attributes:
         result: Yields the lines that return the results.
-        imports: Import lines. `{}` stands for functions such as `cos`.
+        imports: Import lines. `{}` is replaced by the needed functions, such as `cos, sin`.
         values: Body of the exported function `_values`.
             `_values` evaluates a function at several configurations.
         index: Pattern of an input's number, such as `q[0]`.
@@ -238,7 +238,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    # `forward` calls the function with the fewest inputs.
+    # `forward` calls the exported function with the fewest inputs.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,

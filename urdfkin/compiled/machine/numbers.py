@@ -54,7 +54,7 @@ class Product(types.Type):
 
 
 class ConstantNumber(types.Type):
-    """A compile-time constant: 0, 1, or None for `unused()`."""
+    """Type of `zero()`, `one()` or `unused()`: value 0, 1 or None at compile time."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value

@@ -253,7 +253,7 @@ def make_single_evaluator(
     """Make a function for one configuration.
 
     The tree must have one frame and a fixed base. The returned array contains the kernel's arguments.
-    `KernelArgs.COUNT` is the number of computed results.
+    The function counts its valid results in `KernelArgs.COUNT`.
     """
     kernel, local_kernel, orders, columns = _KERNELS[quantity]
     local = reference.own_axes

@@ -70,9 +70,9 @@ def compare(
 ) -> TableComparison:
     """Compare a table with a path of a URDF.
 
-    The table may have other base and tip frames than the path. The table's frames must be fixed to the
-    path's base and tip links. `tolerance` (m) applies at the tip. With `fit`, base, tool, joint offsets and
-    signs are fitted first.
+    The table may have other base and tip frames than the path. The table's base (tip) frame must be fixed
+    to the path's base (tip) link. `tolerance` (m) applies at the tip. With `fit`, base, tool, joint offsets
+    and signs are fitted first.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -126,9 +126,9 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, target_error: float) -> tuple[float, float]:
-    """Return the largest tip errors (m, rad).
+    """Return the largest tip errors (m, rad) on samples after a fast fit.
 
-    The fit stops at a tip error of at most `target_error` (m).
+    The fit tries no further joint signs if metres + reach * radians <= `target_error` (m).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -209,7 +209,7 @@ def _find_absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOf
 def _reference_row_index(reference: DHTable, i: int, cell: str) -> int | None:
     """In a modified table, row i + 1 contains a, alpha and beta of standard row i.
 
-    The result is None if the table has no row i + 1.
+    A modified table omits these three cells of the last standard row; the result is then None.
     """
     reference_index = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return reference_index if reference_index < len(reference.rows) else None
@@ -313,7 +313,8 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     """Return bounds (m, rad) of the tip error.
 
     The bounds exclude rounding errors. Mimic rules are ignored. The bounds hold for all angles, and for
-    displacements within the limits. Without a range (`has_range`), `ASSUMED_LIMIT` replaces the limits.
+    displacements within the limits. For a prismatic joint without a range (`has_range`), the limits are
+    -`ASSUMED_LIMIT` and `ASSUMED_LIMIT`.
     """
     mechanisms = Mechanism(_make_free_tree(path, table)), Mechanism(to_free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)

@@ -45,7 +45,8 @@ _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
-#: The fit ends when the mean error is at most this fraction of the reach.
+#: The fit of the cells ends when the norm of the 6 s errors (s samples) no longer decreases,
+#: and the norm is at most 6 s * reach * this number.
 _CONVERGED_ERROR = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
@@ -127,7 +128,7 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_and_amounts(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path, and (s, 5 n) angles (rad) and lengths (m) along the path.
+        """Return the path and the amount (rad or m) of each elementary motion, (s, 5 n).
 
         `values` are (s, n) joint values.
         """
@@ -197,7 +198,7 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the tip's twists (6 s, 6) due to a frame's motion.
+    """Return the tip's twists (6 s, 6) for unit motions of a frame, at s samples.
 
     Columns: translations along the frame's axes, rotations about the frame's axes.
     """
@@ -240,7 +241,7 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
     """Fit the table by changing few cells.
 
-    `mask` (n, 5) is 1 for allowed changes. With `free`, the free parameters change too.
+    `mask` (n, 5) is 1 for allowed changes. With `free`, base, tool and joint offsets change too.
     """
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
@@ -321,7 +322,7 @@ def fit_model(
 ) -> TableArrays:
     """Fit the free parameters.
 
-    The fit stops at a tip error of at most `target_error` (m).
+    The fit tries no further joint signs if metres + reach * radians <= `target_error` (m).
     """
     written = TableArrays.of(standard)
 
@@ -362,7 +363,7 @@ def move_end_offsets_to_base_and_tool(model: TableArrays, written: TableArrays) 
 
 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
-    """Yield the table, then the table with likely joint signs."""
+    """Yield the table, then a table for each likely combination of joint signs."""
     yield TableArrays.of(standard)
     for alignment in find_sign_fits(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
@@ -415,7 +416,7 @@ def _least_squares_fit(
 
 
 def _add_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Change the offsets of two consecutive revolute joints by opposite angles.
+    """Return tables in which the offsets of two consecutive revolute joints change by large angles.
 
     The two rotations cancel if the joints' axes coincide.
     """

@@ -34,7 +34,8 @@ _MAX_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL_TILT = 2e-2
 #: Cost (metres) of each difference from the interpretation that the file states:
-#: cost = _DIFFERENCE_COST * min(sum of |shape of the table - shape of the URDF|) + tolerance
+#: cost = _DIFFERENCE_COST * min(D) + tolerance
+#: D: sum of |shape of the table - shape of the URDF|
 #: The minimum is over all interpretations.
 _DIFFERENCE_COST = 0.1
 #: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
@@ -198,7 +199,8 @@ class Interpretation:
     """Convention, units and columns of a table.
 
     Attributes:
-        columns: True contents of the columns a, alpha, d and theta.
+        columns: Quantities in the columns a, alpha, d and theta, in this order.
+            For example, ("d", "alpha", "a", "theta") exchanges a and d.
     """
 
     convention: DHConvention | None
@@ -207,7 +209,7 @@ class Interpretation:
     columns: tuple[str, ...] = COLUMNS
 
     def table(self, data: Mapping[str, Any]) -> DHTable:
-        """Return the table without base and tool."""
+        """Read `data` with this interpretation, without base and tool."""
         stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         contents = dict(zip(COLUMNS, self.columns, strict=True))
         rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]

@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. A fit of the
-corrected table changes fewer parameters.
+A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. If the
+cell is corrected first, the fit changes fewer parameters.
 """
 
 from __future__ import annotations

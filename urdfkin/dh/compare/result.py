@@ -40,7 +40,7 @@ class CellDifference:
     Values are in m or rad.
 
     Attributes:
-        tip_displacement: Largest tip displacement on samples due to this cell, m.
+        tip_displacement: Largest displacement of the tip on samples if this cell is corrected, m.
         half_digit: Half a unit of the last digit of `reference`.
             0 if the value is exact or the cell's text is unknown.
     """
@@ -137,10 +137,10 @@ class TableComparison:
         travel: Sum of the prismatic joints' largest absolute values, m.
         senses: Signs of the joints.
             The table's variable is sign * q + offset.
-        metres, radians: Largest tip errors on samples.
+        metres, radians: Largest tip errors on samples, after the fit if `is_fitted`.
         metres_bound, radians_bound: Proven bounds, without rounding errors.
-            They hold for all angles, and displacements within the limits.
-            A prismatic joint without limits stays within 10 m of zero.
+            The bounds hold for all angles, and for displacements within the limits.
+            Without limits, a prismatic joint is assumed within 10 m of zero.
         unfitted_metres, unfitted_radians: Tip errors without a fit.
         unfitted_differences: Cells that must change so that the unfitted table agrees.
             Empty if `is_fitted` is false, or if `mistakes` is not empty.
@@ -227,15 +227,16 @@ class TableComparison:
 
 
 def has_range(limit: Limit | None) -> bool:
-    """Return whether limits are finite and different.
+    """Return whether both limits are finite, and lower < upper.
 
-    A joint without motion does not show the direction of its axis. Both limits are 0 if a URDF omits them.
+    With equal limits, the joint's direction of motion cannot be found from poses. Both limits are 0 if a URDF
+    omits them.
     """
     return is_bounded(limit) and limit.lower < limit.upper
 
 
 def fit_resolution(relative_error: float, radians: float) -> float:
-    """Return the power of ten for rounding fitted numbers.
+    """Return the rounding step of fitted numbers: a power of ten, such as 1e-4.
 
     `relative_error` is in m per m of reach.
     """

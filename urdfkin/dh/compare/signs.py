@@ -53,7 +53,7 @@ class SignFit:
 
     Attributes:
         senses: Signs of the joints.
-            A sign -1 reverses the reference's variable.
+            With sign -1, theta or d decreases if the URDF's joint value increases.
         offsets: Joint offsets (rad or m), added to theta or d.
         base: (4, 4) pose T_base_0.
         tool: (4, 4) pose T_n_tip.
@@ -75,7 +75,7 @@ class _PartialAlignment:
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame, rad.
         delta_in: Offset along z from the last joint's DH frame to its URDF frame, m.
         free_offset: A joint offset that can be chosen freely: index of its row, and 1 or -1.
-            With -1, x rotates backwards if the offset increases.
+            With -1, an increase of this offset rotates the axis x about -z.
     """
 
     cost: float
@@ -143,7 +143,7 @@ def _constant_pose(chain: FrameChain, k: int, sense_before: int, sense_after: in
 def _extend(
     partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_PartialAlignment]:
-    """Return alignments that also contain joint i + 1."""
+    """Extend an alignment by joint i + 1 with joint sign `sense`, in each possible way."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     both_revolute = turns[i] and turns[i + 1]
     A = _constant_pose(chain, i + 1, partial.senses[-1], sense)
@@ -183,7 +183,7 @@ def _free_offset(
 
 
 def _adjust_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the free offset to obtain `theta`.
+    """Change the free offset so that the last row's angle becomes `theta`.
 
     The last joint must be prismatic.
     """
