@@ -22,7 +22,7 @@ from urdfkin.urdf.xacro import find_arguments
 #: Functions of xacro that would reveal types and attributes.
 _FORBIDDEN_SYMBOLS = ("type", "vars")
 
-#: An expression that urdfkin refuses, although xacro evaluates it.
+#: Test expression that xacro alone evaluates, and urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"the expansion takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"

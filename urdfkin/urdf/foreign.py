@@ -191,9 +191,9 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Link that each joint moves, by the joint's index.
+        #: {index of a joint: name of the link that the joint moves}.
         self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
-        #: Link of each converted frame, by the frame's index.
+        #: {index of a converted frame: name of its link}.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 

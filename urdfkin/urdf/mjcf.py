@@ -352,7 +352,7 @@ def is_text(source: object) -> bool:
 
 
 #: Lists of MuJoCo's model that kinematics does not use.
-#: Each name is paired with the singular of the name.
+#: Keys are attributes of `MjSpec`; values are the singulars in messages.
 _SINGULAR = {
     "keys": "key", "sensors": "sensor", "actuators": "actuator", "tendons": "tendon", "excludes": "exclude",
     "pairs": "pair", "skins": "skin", "flexes": "flex", "geoms": "geom", "cameras": "camera",
@@ -409,7 +409,7 @@ def _remove_unused_elements(mujoco: Any, spec: Any) -> None:
         site.material = ""
     for joint in spec.joints:
         # The next loop replaces all inertias by placeholders.
-        # With `align`, MuJoCo would align a body's frame with its inertial frame.
+        # With `align`, MuJoCo would move a free body's frame to its inertial frame.
         # The inertia is only a placeholder.
         # Therefore, `align` is switched off.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE

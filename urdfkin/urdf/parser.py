@@ -390,7 +390,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Message and remedy (or None) for each message of expat.
+#: Pairs (message, remedy or None) for each message of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -541,7 +541,7 @@ class NumberReader:
         )
 
 
-#: For these elements, a message about an invalid number names only the attribute.
+#: Messages about invalid numbers in these elements name the attribute, but not the tag.
 #: For other elements, the message also names the element.
 _ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 

@@ -53,7 +53,7 @@ from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
 _MAX_LAYERS = 1_000
-#: A missing limit is infinity or the largest single precision number.
+#: A USD limit of infinity or the largest single precision number means no limit.
 _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: A frame has shear if the cosine between two axes of the frame exceeds `_MAX_SHEAR` * u * n.
 #: The factor n is the number of prims on the path of the frame's prim.
@@ -78,8 +78,8 @@ _COUPLING_WORDS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of joint types that a kinematic tree cannot represent.
 #: OpenUSD recognizes such types only with a plugin.
 _UNSUPPORTED_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Attributes for the nonlinear terms of MuJoCo's joint equality.
-#: URDF mimic rules have no such terms.
+#: USD attributes with the nonlinear coefficients of MuJoCo's joint equality.
+#: URDF mimic rules are linear.
 _NONLINEAR_COEFFICIENTS = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -980,7 +980,7 @@ class _StageReader:
             yield joint, here, there
             return
         # In a URDF, joint and child link have the same frame.
-        # If their frames differ, the joint moves an additional link.
+        # If a USD joint's frame is not its child's, the joint moves an additional link.
         # A fixed joint connects the additional link with the child link.
         between = make_unique(f"{name}_link", self._link_names)
         yield joint, here, between

@@ -169,7 +169,7 @@ class _AccuracyBatch:
         )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Yield the analytical Jacobians of each representation.
+        """For each representation, yield urdfkin's, Pinocchio's and the exact analytical Jacobians.
 
         Skip Euler angles near a singularity, and quaternions with an uncertain sign.
         """
@@ -206,7 +206,8 @@ def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return the indices of each link's nonzero Jacobian columns.
 
     Returns:
-        (n, links, m) indices; m is the largest number of nonzero columns. Zero columns fill the rest.
+        (n, links, m) indices for n samples; m is the largest number of nonzero columns of any sample and
+            link. Zero columns fill the rest.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))

@@ -47,7 +47,7 @@ Answer = ChunkResult | Failure
 
 
 def answer_chunk(chunk: Chunk) -> Answer:
-    """Run a chunk; every exception except an interrupt becomes a `Failure`."""
+    """Run a chunk; convert an error (class `Exception`) into a `Failure`."""
     try:
         return run_chunk(chunk)
     except Exception as error:

@@ -95,7 +95,7 @@ def validate(
         store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
             run. The function `read_stored_report` makes a report from the folder at any time.
         retry: "failed": try again to check the robots that an earlier run could not check. The
-            files of these robots are allowed to differ from the earlier run.
+            files of these robots, such as URDF files, may have changed since the earlier run.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
@@ -198,7 +198,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 def _can_be_loaded(robot_input: RobotInput) -> bool:
     """Return whether a robot can be loaded.
 
-    If not, the robot's first chunk reports the error.
+    If loading fails, the robot's first chunk reports the error.
     """
     try:
         robot_input.load()
@@ -238,7 +238,7 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in studies), None not in studies
 
 
-#: Above _WORTH_LOADING samples, loading kernels from disk saves time.
+#: Above _WORTH_LOADING samples, loading kernels from disk is faster than interpreting.
 #: Above _WORTH_COMPILING samples, compiling missing kernels saves time.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 

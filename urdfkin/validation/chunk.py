@@ -256,7 +256,7 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
-        """Yield error statistics for the frames and joints.
+        """Yield the key and error statistics of each quantity, for frames and for joints.
 
         A joint and its child link have the same frame. Pinocchio has different functions for joints and
         links, so urdfkin's result is compared with both.
@@ -305,7 +305,7 @@ class _Block(_ComparisonBatch):
 class _Screws(_ComparisonBatch):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
-    Each column of `data.J` is a joint's Jacobian column in WORLD.
+    Each column of `data.J` belongs to one joint velocity, and is in WORLD.
     """
 
     def compare(self) -> Iterator[ErrorStats]:
@@ -341,7 +341,7 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Convert q to configurations of a tree without mimic rules."""
+    """Return q for the tree `free`, in which mimic joints are independent joints."""
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -166,9 +166,9 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if the cluster and this machine have different versions.
+    """Raise ClusterError if library versions or urdfkin's code differ from this machine's.
 
-    Call this function before any data are sent.
+    Call this function before any robot or chunk is sent to the cluster.
     """
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
@@ -267,7 +267,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Delete the robot's text on the workers after its last answer."""
+        """If no chunk of the robot is pending, delete its text on the workers."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

@@ -30,7 +30,7 @@ class CampaignProgress:
         robots_done: Number of complete or failed robots.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_from_earlier_run: Number of finished chunks from an earlier run.
-        failures: Number of robots with a disagreement or without a check.
+        failures: Number of robots with a disagreement or a failed chunk.
     """
 
     robots_done: int

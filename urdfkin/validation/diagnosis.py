@@ -65,7 +65,7 @@ class Diagnosis:
         """Return max |actual - predicted| / max |actual - expected|.
 
         Args:
-            predicted: urdfkin's results with a supposed mistake.
+            predicted: urdfkin's results with a mistake that the user's function may have.
             n: Use only the first n configurations.
         """
         scale = self._nonzero_scale(n)
@@ -109,7 +109,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A common mistake: a sentence that describes the mistake, and a function.
+#: A common mistake: (sentence that describes the mistake, function without arguments).
 #: The function returns urdfkin's results with the mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
@@ -272,10 +272,10 @@ class Mistakes:
 
     @staticmethod
     def _scale_joints(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply q, v and a of some joints by `factor`.
+        """Return the inputs with some joints' q, v and a multiplied by `factor`.
 
         `at` contains the index in q, and the index in v and a, of each joint. If `count` is 1, only q
-        changes; if 2, q and v; if 3, q, v and a.
+        is multiplied; if 2, q and v; if 3, q, v and a.
         """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):

@@ -266,7 +266,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison of urdfkin and Pinocchio with a second oracle.
+    """Two comparisons with a second oracle: of urdfkin, and of Pinocchio.
 
     The entry exists only if there is a second oracle.
     """

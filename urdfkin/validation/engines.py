@@ -21,7 +21,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer_chunk, make_lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks in an executor's queue.
+#: Maximum number of submitted chunks whose answers the engine has not yet taken.
 IN_FLIGHT = 512
 
 
@@ -103,8 +103,8 @@ class RobotTasks:
     """Iterator over the tasks of a robot.
 
     Attributes:
-        robot: Index of the robot, -1 at first.
-        index: Index of the latest chunk, -1 at first.
+        robot: Index of the robot; -1 before the first task.
+        index: Index of the latest task's chunk; -1 before the first task.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:

@@ -202,7 +202,7 @@ class ErrorStats:
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile; the error is at most the width of a bin."""
+    """Return a percentile; below the last edge, the error is at most a bin's width."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0

@@ -232,7 +232,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A verifier that stores the latest call of each quantity."""
+    """A verifier that stores the inputs of the latest call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -685,7 +685,7 @@ def _call(
 ) -> FloatArray | None:
     """Call the function, and return a copy of the result.
 
-    After an error, add a message to `total` and return None.
+    After an exception or an invalid result, add a message to `total` and return None.
     """
     try:
         result = function(*inputs)

@@ -18,7 +18,7 @@ from pathlib import Path
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
 
-#: Maximum size of one array of results, bytes.
+#: Maximum size (bytes) of an array of results; one frame's array can be larger.
 #: At most _ARRAYS such arrays exist at the same time.
 BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
@@ -33,18 +33,18 @@ _GROUPS = Path("/sys/fs/cgroup")
 
 
 def limit(processes: int = 1) -> int | None:
-    """Return the memory limit per process, bytes; None if unknown."""
+    """Return the memory (bytes) for each of `processes` processes; None if unknown."""
     free = min(_free(), default=None)
     return None if free is None else int(_FRACTION * free / processes)
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the size of the largest array for one frame, bytes."""
+    """Return the bytes of one frame's largest array: (samples, 4, 4) or (samples, 6, nv)."""
     return samples * 8 * max(16, 6 * nv)
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `BLOCK_BYTES`.
+    """Divide `count` items into slices of at most `BLOCK_BYTES`, or of one item.
 
     For zero items, yield one empty slice.
     """

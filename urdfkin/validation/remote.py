@@ -46,7 +46,7 @@ def store_robot(robot: bytes) -> bytes:
 
 
 def run(robot: bytes, chunk: bytes, client_provenance: dict[str, str]) -> ChunkOutcome:
-    """Run a pickled chunk in a process.
+    """Run a pickled chunk in a worker process; after a crash, try a new process.
 
     If the versions or digests differ from the client's, the chunk is not run.
     """
@@ -72,7 +72,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """A pickled robot and chunk. The receiver gets the chunk with its robot."""
+    """A pickled robot and chunk. The receiver gets a `Chunk` that contains its `RobotInput`."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

@@ -81,7 +81,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, RangeReduction]) -> dict[st
 
 
 def _remaining_range(narrowed: RangeReduction | None) -> dict[str, Any] | None:
-    """Return the range in which all mimic joints are within their limits.
+    """Return the range of a mimicked joint within the limits of its mimic joints.
 
     None means the joint's whole range.
     """

@@ -206,7 +206,7 @@ class Store:
             path.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files with unknown names, and move them to `damaged/`."""
+        """Report files with unknown names; a writable store moves them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -218,10 +218,10 @@ class Store:
                 self._quarantine(path, "is not used: no chunk of this campaign has this name")
 
     def count_chunks(self) -> dict[int, tuple[int, bool]]:
-        """Count the stored chunks of each robot.
+        """Count the chunks with a stored result, for each robot.
 
         Returns:
-            (number of chunks, whether a chunk failed) for each robot.
+            {robot: (number of chunks with a result, whether a chunk failed)}.
         """
         names = {path.name for kind in (_DONE, _FAILED) for path in self._files(kind)}
         counts = {}
@@ -356,9 +356,12 @@ def _is_ours(path: Path) -> bool:
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Return the store with its manifest.
 
-    - No manifest in the folder: write the manifest.
-    - Changed files, and all these robots failed: `retry_failed` replaces the manifest.
-    - Otherwise: both manifests must agree. The old manifest stays, with the original start time.
+    | case | result |
+    |---|---|
+    | The folder has no manifest. | Write the new manifest. |
+    | `retry_failed`; only the files of failed robots have changed. | Replace the old manifest. |
+    | Any other case; both manifests agree. | Keep the old manifest with its start time. |
+    | Any other case; the manifests differ. | Raise InputError. |
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -485,7 +488,7 @@ class AccuracyStore:
 
     @classmethod
     def from_store(cls, store: Store) -> AccuracyStore | None:
-        """Return the stored accuracy results, or None."""
+        """Return the store's accuracy results; None if they are missing or unreadable."""
         try:
             if (content := read_if_exists(store.folder / _STUDY_FILE)) is None:
                 return None

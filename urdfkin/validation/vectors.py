@@ -82,7 +82,7 @@ SPATIAL_ACCELERATION = replace(
 )
 #: Spatial acceleration = classical acceleration - w x v.
 #: The bound of ACCELERATION includes the error of w x v.
-#: Therefore, both accelerations have the same bound.
+#: Therefore, spatial and classical acceleration have the same bound.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip

@@ -147,7 +147,7 @@ class ProcessEngine:
     def run(self, work: Work, on_answer: AnswerCallback) -> None:
         """Run the tasks of all robots.
 
-        After a crash, the robot's remaining tasks run last, in a process of their own.
+        Without `isolate`: after a crash, the robot's remaining tasks run last, in a separate process.
         """
         if self._isolate:
             _WorkerPool(work, self._jobs, on_answer, alone=CRASHED).work()
@@ -162,8 +162,8 @@ class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
     Args:
-        alone: None if a process validates several robots. Otherwise, each process validates one robot, and
-            `alone` is the reason in the report after a crash.
+        alone: None if a process validates several robots. Otherwise, each process validates one robot. If
+            the process crashes, `alone` is the reason in the robot's report.
     """
 
     def __init__(self, work: Work, jobs: int, on_answer: AnswerCallback, *, alone: str | None = None) -> None:

@@ -36,7 +36,7 @@ from urdfkin.urdf.sources import UrdfText
 
 #: Maximum number of passes of `--fix` over a file.
 #: The fixes of one pass do not overlap.
-#: The findings of these fixes have the same code.
+#: A pass fixes findings of one code only.
 MAX_PASSES = 100
 
 #: Maximum angle (rad) by which rounding to doubles rotates a unit vector.
@@ -62,7 +62,7 @@ def fix_text(
     examine: Callable[[UrdfText], Examination],
     choose: Callable[[], Callable[[Finding], bool]],
 ) -> FixResult:
-    """Apply the automatic fixes; do not change a file with errors.
+    """Apply the automatic fixes to a file without errors.
 
     The fixes of one finding code, such as URDF507, are applied in one pass.
 
@@ -142,7 +142,7 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor for the rounding errors of the sum `Fix.max_rotation`.
+#: Factor that covers the rounding errors in the sum of rotations `max_rotation`.
 _SLACK = 1 + Fraction(1, 2**50)
 
 

@@ -20,11 +20,12 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 MAX_MASS, MAX_COORDINATE = 1e9, 1e6
 
 #: A nonzero mass (kg) below this number is probably a placeholder.
-#: The moments of inertia of such a body are not checked.
+#: If 0 < mass < NEGLIGIBLE_MASS, the moments of inertia are not checked.
 NEGLIGIBLE_MASS = 1e-3
 
-#: Tolerance for moments of inertia per kg of a body's mass (m^2).
-#: Only bodies below about 0.03 mm have moments below the tolerance.
+#: Tolerance per kg of mass (m^2) of two checks of the principal moments:
+#: no moment is negative, and none exceeds the sum of the other two.
+#: Only bodies with a radius of gyration below 0.03 mm have smaller moments.
 NEGLIGIBLE_MOMENT = 1e-9
 
 #: Relative rounding error of the moments of inertia in a file.

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quote(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Only macros directly inside <robot> or inside a joint can change kinematics.
+    # Only xacro elements directly inside <robot>, or anywhere inside <joint>, can change kinematics.
     if _report_xacro(
         report, "xacro", macros, lambda x: x.parent in (None, root) or x.top_element.tag == "joint"
     ):
@@ -267,7 +267,7 @@ def _is_link_or_joint(element: Element) -> bool:
 
 _LINK_OR_JOINT = frozenset({"link", "joint"})
 
-#: Minimum length of tags that cannot be a misspelt `link` or `joint`.
+#: Tags of this length or longer are not a misspelt `link` or `joint`.
 _MAX_TAG_LENGTH = 8
 
 
@@ -331,7 +331,7 @@ def _check_repeats(report: Reporter, element: Element) -> None:
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: URDF202 and URDF112 report tags with these beginnings.
+#: URDF214 skips tags with these beginnings, because URDF202 and URDF112 report them.
 _PREFIXES_OF_OTHER_RULES = ("xacro:", "xi:include")
 
 
@@ -383,7 +383,8 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Maximum number of characters of a name; longer names break tables and file paths.
+#: Maximum number of characters of a name; URDF405 reports longer names.
+#: Longer names break tables and file paths.
 MAX_NAME_LENGTH = 200
 
 

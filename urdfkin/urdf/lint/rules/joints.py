@@ -143,7 +143,7 @@ NOTE_LENGTH_ERROR = 2e-4
 #: Tolerance of a unit vector's length, as in `kinematics.inputs`.
 _UNIT_LENGTH_TOLERANCE = 1e-12
 
-#: An axis with a small xy part counts as the z axis.
+#: An axis with a small xy part and z > 0 counts as the z axis.
 #: The xy part is at most this fraction of the z component.
 _Z_AXIS_TOLERANCE = 1e-9
 
@@ -330,7 +330,7 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 MAX_MIMIC_NUMBER = 1e6
 #: A mimic joint's limits can exclude part of the mimicked joint's range.
 #: URDF527 reports parts above this fraction of the range.
-#: Rounded limits often exclude a small fraction of the range.
+#: Limits with few digits often exclude a small fraction of the range.
 NEGLIGIBLE_RANGE_LOSS = 1e-3
 
 
@@ -519,10 +519,10 @@ SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 #: The finding is a warning if the displacement exceeds this length (m).
 NOTICEABLE_DISPLACEMENT = 1e-3
 
-#: Maximum difference (rad) from a multiple of pi that is not reported.
+#: Maximum difference (rad) of an angle that counts as an exact k * pi.
 NEGLIGIBLE_ANGLE = 1e-10
 
-#: Pairs of a factor k and a minimum number of decimals.
+#: Pairs (k, minimum number of decimals of a rounded k * pi).
 #: Angles with fewer decimals do not count as rounded k * pi.
 _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d

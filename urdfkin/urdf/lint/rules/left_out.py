@@ -39,11 +39,11 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Number of leading bytes of a file that are searched for elements.
+#: Number of leading bytes of a file that are searched for the elements in findings.
 _MAX_SEARCHED_BYTES = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements whose findings contain no name.
+#: MJCF elements that findings report by tag, without a name.
 #: Keys are tags in the file; values are tags in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Beginning of a prim in a USD text file, or a delimiter.
@@ -59,7 +59,7 @@ _SKIPPED_TEXT = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line, column and width of each element, by tag and name.
+#: {(tag, name): (line, column, width)} for the beginning of each element or prim.
 #: Lines and columns count from 1.
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
