@@ -51,7 +51,7 @@ ROOT = Path(__file__).parents[1]
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
 #: Time limit of axe-core, in seconds.
-#: A page of 100,000 elements takes half a minute.
+#: axe-core needs half a minute for a page of 100,000 elements.
 _AXE_SECONDS = 600
 #: Severities of accessibility violations that count as errors. Other violations are only printed.
 IMPACTS = ("serious", "critical")

@@ -55,7 +55,7 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
         return 0
     # git prints an entry for each changed file:
     # added lines TAB deleted lines TAB path NUL.
-    # If a file was moved, the entry is:
+    # git's entry for a moved file:
     # added lines TAB deleted lines TAB
     # NUL old path NUL new path NUL.
     changes = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)

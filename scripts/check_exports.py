@@ -51,9 +51,10 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _DEFAULT_LANGUAGES = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--languages` names them.
 _OTHER_LANGUAGES = ("sympy-exact",)
-#: If a robot has more joint velocities than this number, a PyTorch or JAX file contains no Hessian.
+#: For robots with more joint velocities, the formats `torch` and `jax` are checked without Hessian.
 #: The check of a larger Hessian is slow.
-#: An `array` file for JAX has no Hessian: JAX would compile the Hessian for minutes.
+#: For JAX, the format `array` is checked without Hessian.
+#: JAX would compile this Hessian for minutes.
 _MAX_HESSIAN = 16
 _ERROR_RATIO = re.compile(r"worst error (\S+) of the bound")
 

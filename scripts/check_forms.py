@@ -45,7 +45,7 @@ from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints.
-#: The package therefore computes only 6 tables with at most 4 rows each.
+#: The format `matlab-symbolic` is checked for at most 6 tables of at most 4 rows.
 MAX_SYMBOLIC_TABLES, MAX_SYMBOLIC_ROWS = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 #: First line of the Octave program, for each format.
@@ -77,7 +77,7 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: Function that returns the poses of all jobs.
+#: Function of jobs and a folder; returns one array of poses for each job.
 #: The function may write files into the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
@@ -214,7 +214,7 @@ class Case:
         return self.job.table
 
     def measure_errors(self, found: FloatArray) -> tuple[float, float]:
-        """Compare poses with Pinocchio and with urdfkin.
+        """Compare the poses from a table's exported code with Pinocchio and with urdfkin.
 
         Returns:
             Largest difference from Pinocchio's position (m).

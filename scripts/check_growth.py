@@ -164,7 +164,7 @@ KINDS: dict[str, Kind] = {
 
 
 def measure_cost(kind: str, size: int) -> str:
-    """Return the processor time and the memory per MB of the document.
+    """Return the processor time (s) and the memory (MB), both per MB of the document.
 
     The memory includes the findings.
     """

@@ -99,7 +99,7 @@ def imports_by_module() -> Mapping[str, frozenset[str]]:
 def _reexported(package: str) -> frozenset[str]:
     """Return the names that `__init__.py` imports.
 
-    Such a name can hide a submodule.
+    An imported name can hide a submodule of the same name.
     """
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
@@ -141,7 +141,7 @@ _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def draw_picture() -> str:
-    """Draw a dot for each import between packages."""
+    """Return an SVG picture; a dot shows that one package imports another."""
     index = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [

@@ -60,7 +60,7 @@ ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
 #: A robot that shows the order of coordinates.
-#: Joints z and a are at the base.
+#: The link `base` is the parent of joints z and a.
 #: Joint k comes after joint z.
 TREE = _robot(
     _joint("z", "revolute", "base", "l1"),

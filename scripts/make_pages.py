@@ -165,8 +165,7 @@ STUDIED_ROBOTS = {
     "polar": "polar robot of the textbook",
 }
 MOVING_BASE_ROBOTS = ("talos", "anymal", "ur5")
-#: Numbers of samples per robot:
-#: in the accuracy study, and in the table of enclosures.
+#: Numbers of samples per robot in the accuracy study, and in the table of enclosures.
 SAMPLES, ENCLOSURE_SAMPLES = 10, 5
 
 
@@ -237,7 +236,7 @@ def _robot_rows() -> Iterator[tuple[object, ...]]:
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
             # `steps`: largest width of an interval, divided by the distance between neighbouring doubles.
-            # The distance is that of the doubles next to the quantity's largest absolute value.
+            # The distance is `np.spacing` of the quantity's largest absolute value.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

@@ -32,7 +32,7 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     name: str  # label of the row on the page
-    arguments: tuple[str, ...]  # arguments of the interpreter; ROBOT is a URDF file
+    arguments: tuple[str, ...]  # arguments of `python`; the path of a URDF file replaces ROBOT
     max_ratio: float = math.inf  # time limit, divided by the time of `import numpy, pinocchio`
     empty_cache: bool = False  # True: the process finds no compiled kernels on disk.
 

@@ -77,7 +77,7 @@ def _read_tests() -> dict[Path, str]:
 
 
 def find_near_tests(path: Path) -> list[str]:
-    """Return the tests of a module and its package."""
+    """Return the test files that mention a module, and the test files of its package."""
     package, _, name = module_name(path).rpartition(".")
     pattern = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -186,7 +186,8 @@ def evaluate_named(named: NamedMutant, *, timeout: float) -> Outcome:
     change = {"URDFKIN_MUTANT": module_name(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
     result, detail = _run_in_process(change, [named.test], timeout)
     if result == "detected" and not detail.startswith(f"FAILED {named.test}"):
-        result = "not run"  # pytest reports an error instead of a test failure.
+        # The named test did not fail: pytest reports another problem, for example an import error.
+        result = "not run"
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
     return Outcome(mutant, result, detail)

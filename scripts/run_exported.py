@@ -75,7 +75,7 @@ def check_compiled(scope: dict[str, Any]) -> float:
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio; NaN counts as largest."""
+    """Return the largest ratio; the ratio after a NaN replaces the NaN."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

@@ -13,8 +13,8 @@ usd-exchange contain modules with equal names:
 The script prints a table with one row for each robot. If the user names one tool, a row shows the verdict of
 `same`, and bounds on the distance and on the angle between matching frames. If the user names several tools,
 a row has one cell for each tool, with a short verdict and the bound on the distance. The full verdicts are
-printed to standard error. For several tools, `same` uses no branch and bound. This saves time, but the bounds
-may be larger.
+printed to standard error. For several tools, `same` uses no branch and bound. Without branch and bound,
+`same` is faster, but the bounds may be larger.
 
 The script removes visuals and collisions, because a converter would search for the meshes. MuJoCo refuses a
 moving body without mass. The script therefore sets options of MuJoCo. The options give bodies without mass a
@@ -109,7 +109,7 @@ class RefusalError(Exception):
 
 
 def convert(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Convert a URDF; return the tool's input file and output file."""
+    """Convert a URDF with a tool; return the file that the tool reads and the file that it writes."""
     reads, program, writes = TOOLS[tool]
     source = convert(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")

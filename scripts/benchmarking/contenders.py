@@ -339,7 +339,7 @@ def toolbox(workload: Workload, quantity: str) -> Iterator[Calls]:
     yield Calls(label, names, lines, order=order, remark=remark)
 
 
-#: In larger calls, PyTorch Kinematics takes more time per configuration.
+#: Above this batch size, the time of PyTorch Kinematics per configuration grows.
 _MAX_BATCH = 20_000
 #: Tolerance for PyTorch Kinematics.
 #: PyTorch Kinematics reads the angles of a URDF in single precision.

@@ -45,7 +45,8 @@ def frame_results(
     """Return a frame's results in world axes.
 
     The equations are 7.85 (Jacobian) and 7.127 to 7.130 (acceleration).
-    Each joint must have one coordinate. `eq` contains the equations for the inputs' type.
+    Each joint must have one coordinate. `eq` is the module `equations`, or has the same functions for another
+    array type.
     """
     recursion, state, columns = Recursion(eq, own_axes=quantity == "acceleration"), LinkState(), []
     for i, (kind, _, velocity_index) in enumerate(plan.steps.tolist()):

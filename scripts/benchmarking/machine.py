@@ -22,8 +22,8 @@ from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
 #: Names of two times (ms) until a process has its first result.
-#: In the first case, the kernel cache is empty.
-#: In the second case, the kernel cache contains all kernels.
+#: `EMPTY`: the kernel cache is empty.
+#: `STORED`: the kernel cache contains all kernels.
 EMPTY, STORED = "empty_ms", "stored_ms"
 #: Methods of `Robot` whose first call compiles a kernel.
 #: Each method has a number of inputs:

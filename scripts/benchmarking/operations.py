@@ -25,9 +25,9 @@ from urdfkin.compiled.plan import (
 from urdfkin.kinematics.arithmetic import bind_equations
 
 #: Operations for sine and cosine of one angle (`compiled.python_numbers`):
-#: 10 for the reduction of the angle to r,
-#: 8 for z = r^2, 1 - z/2 and their rounding errors,
-#: 20 for the polynomials, 13 for the last steps.
+#: 10 operations reduce the angle to r.
+#: 8 operations compute z = r^2, 1 - z/2 and their rounding errors.
+#: 20 operations evaluate the two polynomials, and 13 operations combine the values.
 _SINE_COSINE = 51
 
 
@@ -41,8 +41,8 @@ class Number:
     """
 
     constant: int | None = None
-    #: True for a number without effect on the results.
-    #: Operations with such an operand are not counted.
+    #: True for a placeholder: urdfkin does not compute this number, because no result needs it.
+    #: Operations with a placeholder are not counted.
     unused: bool = False
     operands: tuple[Number, ...] = ()
 

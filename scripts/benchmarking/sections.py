@@ -109,7 +109,7 @@ def _make_row(section: str, workload: Workload, quantity: str, size: int = 0) ->
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
     """Measure chains with the given numbers of joints.
 
-    A batch of Jacobians has about `numbers` elements.
+    Configurations of a batch: numbers / (6 * joints), but at least 16.
     """
     for size in joints:
         n = max(numbers // (6 * size), 16)
@@ -158,8 +158,8 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 # For each k, the benchmark measures a kernel that has only the first k steps.
 # The time of step k is the time for k steps, minus the time for k - 1 steps.
 # For one configuration, the benchmark measures seven lines of Python (`_calls`).
-# Most of these lines omit some steps.
-# Differences between the times of the lines give the step times.
+# Only the last line, which calls the robot's method, contains all steps.
+# The time of a step follows from differences between the times of the lines.
 
 #: Instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -172,7 +172,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def batch_step_times(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step, in ns per configuration."""
+    """For each robot and quantity, yield the time of each step (ns per configuration)."""
     for workload, quantity, _ in _open_workloads("where", n):
         program = compile_program(workload.plan, orientations=False, columns=quantity == "jacobian")
         tasks = [

@@ -17,7 +17,7 @@ import numpy as np
 from scripts.benchmarking.workload import Workload
 from urdfkin.model.tree import FloatArray
 
-#: Maximum allowed difference between contenders (m, rad, m/s^2, rad/s^2).
+#: Maximum allowed difference from the reference contender (m, rad, m/s^2, rad/s^2).
 #: The allowed difference is much larger than rounding errors.
 TOLERANCE = 1e-9
 

@@ -19,7 +19,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Relative tolerance of urdfkin's placements, compared with MuJoCo's placements.
+#: A placement may differ from MuJoCo's by `_TOLERANCE * large`, see `find_difference`.
 #: Equality constraints have 1000 times this tolerance.
 _TOLERANCE = 1e-12
 

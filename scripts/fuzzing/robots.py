@@ -70,7 +70,7 @@ def usual_length(rng: random.Random) -> float:
 def odd_length(rng: random.Random) -> float:
     """Return a length of random magnitude and sign.
 
-    The sum of several such lengths usually does not overflow.
+    The magnitude is below 1e301, so a sum of several lengths does not overflow.
     """
     ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
     exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
@@ -240,7 +240,7 @@ class _RandomRobot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # From URDF 1.2 on, limits apply to all joints.
+        # With `versions`, planar, floating and fixed joints may have limits (URDF 1.2).
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):

@@ -53,7 +53,7 @@ class Change:
 
     @contextmanager
     def applied(self) -> Iterator[Any]:
-        """Change the tree inside a `with` block.
+        """Put the mutant's value into the tree; restore the old value after the `with` block.
 
         Yields:
             The replaced value.

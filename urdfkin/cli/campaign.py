@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Minimum time (s) between two lines about the progress.
-#: Intervals for lines of text and for lines of JSON, s.
+#: `_LINE_INTERVAL` is for lines of text, `_JSON_INTERVAL` for lines of JSON.
 _LINE_INTERVAL, _JSON_INTERVAL = 10.0, 0.5
 
 
@@ -43,7 +43,7 @@ class SpeedEstimator:
 
     def estimate(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, new_chunks = self._now() - self._begin, state.chunks_done - state.chunks_from_earlier_run
-        # Time before the first new result is not counted: urdfkin may compile kernels.
+        # Time before this run's first finished chunk is not counted: urdfkin may compile kernels.
         if new_chunks <= 0:
             self._begin = self._now()
         if new_chunks <= 0 or seconds <= 0.0:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 #: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
-#: `urdfkin diff` does not treat a revision as a file.
+#: `urdfkin diff` rejects a revision, unless a file has this name.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
 
 

@@ -43,7 +43,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     # During completion of an option, click has not parsed ROBOT.
-    # The first argument then counts as ROBOT.
+    # Completion therefore uses the first unparsed argument as ROBOT.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 

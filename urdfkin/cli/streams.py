@@ -140,7 +140,7 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        # Only the text between escape sequences is escaped.
+        # Control characters and CI commands are escaped only between the escape sequences for colours.
         pieces[::2] = [self._without_commands(_escape_unprintable(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
@@ -214,7 +214,7 @@ def wrap_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # For encodings other than UTF-8, click would bypass this stream.
+            # If this stream reported the encoding ASCII, click would bypass this stream.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 

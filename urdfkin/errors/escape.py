@@ -18,7 +18,7 @@ FORMULA_STARTS = ("=", "+", "-", "@")
 #: Pattern of a command of Azure or TeamCity, anywhere in a line.
 #: Group 1 is the character to escape.
 CI_COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: Patterns of the commands of all CI services.
+#: Patterns of commands in logs, for example `::error::`, of GitHub, Azure and TeamCity.
 #: GitHub's commands are at the beginning of a line.
 CI_COMMANDS = (re.compile(r"\A\s*:(:)"), CI_COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 #: The matching time is linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-#: Maximum number of characters of a number.
+#: `parse_float` and `parse_int` reject texts with more characters than this number.
 #: Python converts long integers in quadratic time.
 _MAX_LENGTH = 2000
 

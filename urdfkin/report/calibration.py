@@ -16,7 +16,7 @@ from urdfkin.report.words import format_count
 from urdfkin.system.documents import as_json_data
 
 #: If the user states no noise, the noise is estimated.
-#: The estimate is at least the rounding error.
+#: The estimated noise is at least the rounding error.
 #: Below this `noise_ratio`, the report calls the residuals rounding errors.
 _ROUNDING = 0.5
 

@@ -184,8 +184,8 @@ def _cell(value: Units | str) -> str:
 #: Growth of a robot's largest disagreement beyond this factor is a regression.
 #: Random samples cause smaller growth.
 GROWTH_FACTOR = 2.0
-#: If the new disagreement is below this number (in eps * scale), the growth of a disagreement
-#: is not a regression. A single rounding error can be this large.
+#: Growth is no regression if the new disagreement (in eps * scale) is below this number.
+#: A single rounding error can be this large.
 GROWTH_FLOOR = 2.0
 #: If the new ratio of disagreement to bound is below this number, its growth is not a regression.
 _BOUND_RATIO_FLOOR = 0.1

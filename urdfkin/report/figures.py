@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Left end of the x axis, in eps * scale.
-#: A percentage at this end states the share of disagreements below this number.
+#: The percentage at the left end is the share of disagreements below the left end.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82

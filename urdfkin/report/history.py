@@ -42,12 +42,12 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 MARKED_RUNS, CHARTED_RUNS = 20, 60
 #: Maximum number of changes between runs on the HTML page.
 #: The page lists the latest changes first.
-#: On a terminal, the limit applies to changes and to runs.
+#: A terminal shows at most this number of runs, and at most this number of changes.
 #: On a terminal, the option --all removes the limit.
 SHOWN = 20
 _MAX_LISTED = 500
 #: Symbol of each verdict on a robot.
-#: The key "" is for a run without the robot.
+#: The key "" is for a run whose report does not contain the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
@@ -121,7 +121,7 @@ HISTORY = DocumentKind(
 )
 
 #: Changes between runs, by the source of the changed robot.
-#: The key None is for changes of a whole run.
+#: The key None is for changes of a whole run, for example its number of samples.
 #: Each change has the index of its run.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 

@@ -35,7 +35,7 @@ from urdfkin.robot import Robot
 #: Maximum number of printed lines for each kind of difference.
 #: The option --all removes the limit.
 SHOWN = 12
-#: Message for different models with different joint names or orders.
+#: Message for models that are not the same, if joint names or orders differ.
 GUESSED = (
     "joints are matched by their axes, because their names or their order differ; use --map to match other"
     " joints"
@@ -46,8 +46,8 @@ EQUIVALENT = SameQuestion()
 #: The limit is FACTOR times the bound on rounding errors.
 #: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
-#: Heading for mimicked joints whose range is too large for a mimic joint.
-#: Such a joint moves a mimic joint beyond its limits.
+#: Heading of a list of mimicked joints.
+#: Each listed joint can move a mimic joint beyond the mimic joint's limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 

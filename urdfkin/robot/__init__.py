@@ -1689,7 +1689,7 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # A plain str with the default reference is its own key.
-        # Such a key needs no slow hash of an enumeration member.
+        # The key then contains no `Reference`: the hash of an enumeration member is slow.
         # Every other key contains the class of `frame`, for example `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str

@@ -118,7 +118,7 @@ _MIN_SAMPLES = 3
 #: Names of the .npz arrays for the root link's motion:
 #: pose, velocity and acceleration.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Maximum rounding of times that causes no note to the user, as a fraction of the smallest time step.
+#: Times cause a note if their rounding exceeds this fraction of the smallest step.
 _TIME_ROUNDING = 1e-6
 
 
@@ -605,8 +605,8 @@ def _check_columns(
         )
 
 
-#: If a joint's angles differ by more than this number (rad), the angles are not wrapped.
-#: The number is one turn plus a margin.
+#: If a joint's samples span more than this angle (rad), the samples stay unchanged.
+#: The angle is 2 pi plus a margin.
 #: The margin covers angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
 #: If a joint turns by more than this angle (rad) between samples, the direction of rotation is uncertain.

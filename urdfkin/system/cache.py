@@ -35,7 +35,8 @@ _CHECKSUM_VERSION = "sealed with its name"
 _MAX_UNUSED_SECONDS = 30 * 24 * 3600.0
 #: The modification time of this file is the folder's last use.
 _LAST_USE_FILE = ".used"
-#: Permitted owners of parent folders: root, and the host's root in containers.
+#: Other users that may own parent folders: root (0) and 65534.
+#: In a container, 65534 is the host's root.
 _TRUSTED_OWNERS = (0, 65534)
 
 

@@ -58,7 +58,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: Requirements of the extras for users, from pyproject.toml.
+#: Copy of the requirements of the extras for users in pyproject.toml.
 EXTRAS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",

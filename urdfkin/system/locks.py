@@ -65,7 +65,7 @@ class ImportLock:
             return
         with self._lock:
             if not self._registered:
-                # The class docstring explains why `logging` is imported before the registration.
+                # The class docstring explains the import of `logging` before `os.register_at_fork`.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

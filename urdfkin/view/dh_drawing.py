@@ -112,7 +112,7 @@ class _Canvas:
             # Without this background, lines would make the label illegible.
             look["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
             # Labels of x and z axes are formulas, such as $x_1$.
-            # Other labels are plain text, because names may contain "$".
+            # Names of joints and frames are plain text, because names may contain "$".
             self.axes.text(*position, ", ".join(texts), parse_math=color in (_X, _Z), **look)
 
 

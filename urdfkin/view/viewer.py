@@ -39,12 +39,12 @@ from urdfkin.view.stage import (
 )
 
 #: Joint ranges (rad, m) of at least this size count as unlimited.
-#: The number also applies to velocity limits (rad/s, m/s).
+#: Velocity limits (rad/s, m/s) of at least this size count as unlimited too.
 _UNLIMITED = 100.0
 #: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
-#: Minimum number of steps of a slider for a length.
-#: A step is 1, 2 or 5 times a power of ten.
+#: Minimum number of steps of a slider in m, m/s or m/s^2.
+#: The slider's step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Largest joint velocity (rad/s, m/s) of a slider if the joint has no velocity limit.
