@@ -102,7 +102,7 @@ class Calibration:
             many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         is_noise_stated: Whether the user stated the noise.
-        written_fit: The fit of the written parameters; the others keep their original values.
+        written_fit: The fit of `selected_parameters`; all other joint parameters keep their original values.
         selected_parameters: Indices of the parameters that `written_fit` fits.
         plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
@@ -128,7 +128,10 @@ class Calibration:
 
     @cached_property
     def changes(self) -> FloatArray:
-        """(p,) changes of the parameters, m and rad; 0 for fixed parameters."""
+        """(p,) changes of the parameters, m and rad.
+
+        A fixed parameter of a joint has the change 0. A fixed parameter of base or tool has its start value.
+        """
         return self._change(self.full_fit)
 
     def _change(self, fit: Fit | None) -> FloatArray:
@@ -154,7 +157,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """Changes (p,) of the parameters in the written file, m and rad."""
+        """Changes (p,) of all parameters in `written_fit`, m and rad, even if the file cannot store them."""
         return self._change(self.written_fit)
 
     @cached_property
@@ -259,8 +262,8 @@ def calibrate(
             given.
         radians: True if joint angles of more than one turn are in radians.
         force: Whether to return a fit that is not plausible; `plausibility` then contains the reasons.
-            Without effect if joint values look like degrees. Convert such values, or pass `radians=True` for
-            values in radians.
+            Joint values that look like degrees are refused even with `force`. Convert degrees to radians, or
+            pass `radians=True` if the values are in radians.
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
@@ -356,7 +359,7 @@ def fit_model(
 def _general_target(model: CalibrationModel) -> FloatArray:
     """Return the parameters (p,) of the original model.
 
-    If the tool is fitted, `_TARGET_DIVISORS` defines the target's position.
+    If the tool is fitted, the target is at (L/5, L/6, L/7) in the tip's frame (`_TARGET_DIVISORS`).
     """
     parameter_values = model.chain.initial_values.copy()
     for k, parameter in enumerate(model.chain.parameters):
@@ -375,7 +378,7 @@ def _check_measured(
     """Check the measured data.
 
     Returns:
-        (samples, n) coordinates of the path, and the measured poses.
+        (samples, n) values of the path's independent joints, and the measured poses.
     """
     T = as_pose_array(poses)
     if isinstance(model.source, DHTable):
@@ -528,7 +531,7 @@ def _find_poorly_observable(
 def _verify_written(calibration: Calibration, measurements: Measurements, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio.
 
-    A URDF cannot contain base, tool or gains. Therefore, these parameters are 0 in the comparison.
+    A URDF cannot contain base, tool or gains. The comparison therefore sets base, tool and gains to 0.
     """
     model, fitted = calibration.model, calibration.written_fit
     if fitted is None:

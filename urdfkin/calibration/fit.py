@@ -94,8 +94,7 @@ _PIVOT_FRACTION = 0.5
 #: Maximum number of parameter names in the text "same effect as ...".
 _MAX_NAMES = 3
 #: A parameter stays fixed if a change of other, fitted parameters has the same effect on the measurements.
-#: The text "same effect as ..." omits some fitted parameters.
-#: An omitted parameter contributes at most this fraction of the effect.
+#: The text "same effect as ..." omits fitted parameters with at most this fraction of the effect.
 _EFFECT_FRACTION = 1e-6
 
 
@@ -269,7 +268,7 @@ class Noise:
     radians: float
 
     def deviations(self, full_poses: bool) -> FloatArray:
-        """Return (6,) deviations of a pose, or (3,) of a position."""
+        """Return (6,) standard deviations of a measured pose, or (3,) of a measured position."""
         return np.array([self.metres] * 3 + ([self.radians] * 3 if full_poses else []))
 
 
@@ -281,8 +280,8 @@ class Fit:
         parameter_values: (p,) values of all parameters.
         residuals: (s, 6) or (s, 3) measured minus computed values, in the base, m and rad.
         noise: The standard deviations by which the residuals are divided.
-        covariance: (k, k) covariance of the fitted parameters, in their units; infinite if the redundancy is
-            0.
+        covariance: (k, k) covariance of the fitted parameters, in their units. Infinite if the redundancy is
+            0 and the noise is not stated.
         redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
         chi_squares: (s,) chi^2 statistic of each pose.
     """

@@ -11,8 +11,8 @@ can have a gain g:
     q D            derivative of the tip's pose by g
 
 **URDF.** Each moving joint of the path has six parameters, which change the joint's origin. A fixed joint
-directly before the tip also has six parameters. Other fixed joints have no parameters, because moving joints
-have parameters with the same effect.
+directly before the tip also has six parameters. Other fixed joints have no parameters. On a path from parent
+to child, the parameters of a later joint have the same effect.
 
     T                                                            original origin of the joint
     A                                                            rotation from the z axis to the joint's axis

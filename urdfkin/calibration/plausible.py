@@ -76,7 +76,7 @@ _UNCERTAIN = 5.0
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Each correction of the data removes one common mistake, for example angles in degrees.
 #: All parameters are fitted for at most this number of corrections from `_corrections`.
-#: These corrections have the smallest values of `_Trial.error_before`.
+#: The corrections are tried in ascending order of `_Trial.error_before`.
 _MAX_FITS = 4
 #: A common mistake is a shift of the rows of q relative to the rows of the poses.
 #: urdfkin tries these shifts (number of rows).
@@ -105,7 +105,7 @@ class FitWithData:
     """A fit with its data.
 
     Attributes:
-        q: (s, c) coordinates of the path.
+        q: (s, c) values of the path's independent joints.
         base_tool_fit: Fit of base and tool alone.
     """
 
@@ -180,7 +180,7 @@ class FitWithData:
     def half_turn_zeros(self) -> list[str]:
         """Return the joints whose zero positions changed by about half a turn.
 
-        The values of the next joint may then have the wrong sign.
+        Wrong signs of the next joint's values can cause such a change.
         """
         return [
             f"{parameter.element!r} by {angle(abs(change))}"
@@ -344,7 +344,7 @@ def _find_likeliest_correction(fit: FitWithData, limit: float) -> _Trial | None:
 def _find_reversed_signs(fit: FitWithData) -> _Trial | None:
     """Reverse the signs of joints one by one while the error decreases.
 
-    The result is None if fewer than two signs are reversed.
+    The result is None if the signs of fewer than two joints are reversed.
     """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf

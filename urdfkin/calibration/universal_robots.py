@@ -120,8 +120,9 @@ def make_calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def apply_factory_calibration(robot: Robot | Source, path: Path, order: str = "driver") -> UpdatedURDF:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all joints turn about z, the joint origins are copied from the file. For other URDFs, the joint origins
-    are fitted. The poses of `tool0` in `base` are then those of the calibrated arm.
+    If all joints turn about z, the joint origins are copied from the file. If a joint has another axis, the
+    origins are fitted to the calibrated arm's poses. The poses of `tool0` in `base` are then those of the
+    calibrated arm.
     """
     robot = as_robot(robot)
     origins = read_calibration(path, order)
@@ -179,7 +180,7 @@ def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
 
 
 def _verify_written(result: UpdatedURDF, calibrated: FrameChain, prefix: str) -> Certificate:
-    """Compare poses of the new URDF with poses of the calibration file."""
+    """Compare `tool0` poses of the new URDF with poses computed from the calibration file."""
     written = result.new_robot
     q = written.sample(_FIT_SAMPLES, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])

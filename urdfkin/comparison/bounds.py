@@ -1,7 +1,7 @@
 """Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
 **Search.** The search starts at the random configurations with the largest distances, and varies one
-coordinate at a time. The largest distance found is a lower bound.
+coordinate at a time. The largest distance found is a lower bound of the true largest distance.
 
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
@@ -166,7 +166,7 @@ class DistanceSearch:
         """Return poses in A's root frame.
 
         Returns:
-            (n, frames, 4, 4) poses of both robots.
+            Poses of A's frames, and of B's frames, each (n, frames, 4, 4).
         """
         a, b = self.robots
         Ts_a = compute_poses(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -264,11 +264,11 @@ class DistanceSearch:
         """Return the distances of frame k at the values `z[k]`.
 
         Args:
-            z: (frames, starting points, values, variables) values of the variables.
+            z: (frames, starting points, trials, variables) values of the variables, one row per trial.
             frames: Matching frames.
 
         Returns:
-            (frames, starting points, values) distances, m.
+            (frames, starting points, trials) distances, m.
         """
         # Without variables, `z.reshape(-1, 0)` would raise an error.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
@@ -449,7 +449,7 @@ def _worst_variable(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return the number of halvings until (1/2) sum_ij M_ij h_i h_j < `upper`."""
+    """Return the number of halvings until (1/2) sum_ij M_ij h_i h_j < `upper`; each halves one h_i."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

@@ -43,7 +43,7 @@ _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOTION_ATTRIBUTES = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
 #: Values of `ModelChange.what` for changes that move a link.
-#: `diff` uses these values if the versions have different formats.
+#: Only changes between files of different formats have these values.
 _MOTION_LINK_ATTRIBUTES = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -55,7 +55,7 @@ class ModelChange:
 
     Attributes:
         what: Name of the attribute, for example "origin x"; empty for a new or removed element.
-        size: For versions of different formats: a text such as "38.14 mm off".
+        size: Size of the change, for example "38.14 mm off"; empty for versions of the same format.
     """
 
     element: str
@@ -119,14 +119,14 @@ class Changes:
 
     Attributes:
         sources: Sources of the old and the new version.
-        changes: The changes of the robot's name, then of joints, then of links.
-        effects: One entry for each joint whose changes move links. In this entry, all other joints are
-            unchanged. A joint whose effect cannot be computed, such as a new joint, has no entry.
+        changes: The changes. For versions of the same format: of the robot's name, then joints, then links.
+        effects: One entry for each joint or link whose changes move links. In this entry, all other joints
+            are unchanged. A joint whose effect cannot be computed, such as a new joint, has no entry.
         total: The frame with the largest displacement by all changes. None if no frame moves, or if `effects`
             is false.
         rounding: (m, rad) bound on the pose errors that the single precision of USD files causes. `changes`
-            does not list these errors. None if single precision does not explain all differences. Infinite if
-            the bound was not computed.
+            does not list these errors. None for versions of the same format, and if the verdict of `same` is
+            not `UP_TO_SINGLE`. Infinite if the bound was not computed.
     """
 
     sources: tuple[str, str]

@@ -252,7 +252,7 @@ def _find_cause(
     pose is at q = 0.
 
     Returns:
-        The element that causes the difference, and a description.
+        The cause, for example "origin rpy" or "axis", and a description.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
 #: Values of at least 0.9 m or 0.9 rad have no unit prefix.
-#: Smaller values have the largest unit prefix that makes the number at least 0.1.
+#: Smaller values have the largest unit prefix from m to p that makes the number at least 0.1.
 #: For example, 0.0001 m is written as 0.1 mm, and 0.00005 m is written as 50 µm.
 #: The two limits are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
@@ -68,8 +68,8 @@ class SameQuestion:
     """A condition that `Sameness.holds` checks.
 
     Attributes:
-        within: Largest allowed distance (m) and angle (rad) between matching frames of the unchanged models.
-            None: the verdict must not be `Verdict.DIFFERS`.
+        within: Limit (m and rad) for `Sameness.within`. If `within` is None, the verdict must not be
+            `Verdict.DIFFERS`.
         strict: Whether remarks and the verdict `Verdict.SAME_AFTER` are forbidden.
     """
 
@@ -138,7 +138,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The values in A and B; None for a missing value."""
+        """The values in A and B; None for a missing value, a mimic rule, or names of links."""
         if self.what == "limits":
             return _format_range(self.a), _format_range(self.b)
         if self.what == "idle":
@@ -337,8 +337,8 @@ class Sameness(Displayable):
         unexplained: Differences between the unchanged models that rounding does not explain, by joint or
             link. The numbers of a USD file are rounded to single precision.
         frames: One interval for each pair of matching links, after the changes in `after`.
-        as_written: The interval of the frame that differs most between the unchanged models. None if `after`
-            is empty.
+        as_written: Interval of the frame with the largest distance found, without the changes in `after`.
+            None if `after` is empty.
         bound_as_written: (m, rad) proven bounds on distance and angle between all matching frames of the
             unchanged models. Infinite if no bounds were proven. Of a Denavit-Hartenberg table, only frames
             with equal names in A and B are compared.
@@ -443,7 +443,7 @@ class Sameness(Displayable):
 
         The unchanged models are compared. The limit is the sum of the rounding errors of all joints. A
         wrong number can also move frames by less than this limit. Therefore, only `up_to_single` proves that
-        rounding is the cause. The result is False unless `verdict` is `Verdict.DIFFERS`.
+        rounding is the cause. For every other verdict than `Verdict.DIFFERS`, the result is False.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -461,9 +461,10 @@ class Sameness(Displayable):
     def within(self, most: float) -> bool:
         """Return whether all matching frames are proven to be within `most` (m and rad).
 
-        The unchanged models are compared: their roots coincide, and their coordinates are equal. Different
-        base poses, tool frames and joint zeros can therefore increase the distance. The result is False if
-        matching joints have different types, or if only one model has a joint.
+        The models are compared without the changes in `after`, at equal coordinates. A root coincides with
+        the other model's link of the same name, if this link is on the root body; otherwise, the roots
+        coincide. Different base poses, tool frames and joint zeros can therefore increase the distance. The
+        result is False if `differences` contains a kind outside `BOUNDED_DIFFERENCES`, such as "only in A".
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -487,7 +488,7 @@ class Sameness(Displayable):
         return not (question.strict and (self.verdict is Verdict.SAME_AFTER or self.remarks))
 
     def exit_code(self, *, strict: bool = False, within: float | None = None) -> int:
-        """Return 0 if the models are equivalent, or within the given distance; else 1.
+        """Return 0 if the condition `SameQuestion(within, strict)` holds, else 1.
 
         Args:
             strict: Whether to return 1 also for remarks and the verdict `Verdict.SAME_AFTER`.
@@ -536,9 +537,9 @@ class Sameness(Displayable):
     def convention(self) -> Convention:
         """Return a convention that converts A's coordinates to B's.
 
-        The convention has the names, order, directions and zeros of B's joints. With this convention, A's
-        `robot.convention(...)` converts q, v, a and Jacobians. If the models are equivalent, link poses at
-        A's q and B's q differ only by `base` and `tools`.
+        In this convention, A's joints have the names, order, directions and zeros of B's joints.
+        `robot_a.convention(found.convention())` converts q, v, a and Jacobians. For equivalent
+        models, the link poses at q and at the converted q differ only by `base` and `tools`.
 
         Raises:
             InputError: a coordinate has no match in the other model, or the frames of a planar or floating
@@ -647,10 +648,11 @@ def check_joint_names(tree: KinematicTree, names: list[str], which: str) -> None
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A.
+    """Return the changes that bring B closest to A.
 
-    The function stores the tool poses in `alignment`. With `tables`, every displaced frame is reported as a
-    tool. The frames of a Denavit-Hartenberg table depend on the table's convention.
+    The function stores the tool poses in `alignment`. With `tables` (A or B is a Denavit-Hartenberg table),
+    every displaced frame is reported as a tool. The frames of a Denavit-Hartenberg table depend on the
+    table's convention.
 
     Returns:
         (kind, text) of each change.
@@ -708,7 +710,10 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return matching links of pedestals and other mountings."""
+    """Return the index pairs of matching links that support the robots, for example pedestals.
+
+    Matching links beside the robots are included if their poses are equal.
+    """
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -856,7 +861,7 @@ def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tup
     """Return tilt and shift beyond rounding.
 
     Returns:
-        Tilt (rad) and shift (m). A value within rounding is replaced by 0.
+        Tilt (rad) and shift (m), each 0 if it is at most the tolerance in `rounding`.
     """
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 

@@ -100,8 +100,8 @@ def same(
             most of the time.
         boxes: Maximum number of boxes of configurations in memory during branch and bound. Boxes give sharper
             bounds if the models differ in many places. With 0, no boxes are used.
-        within: Limit (m and rad) for `Sameness.within`. Branch and bound then tries to prove this limit for
-            the distances of all matching frames.
+        within: Limit (m and rad) for `Sameness.within`. If `Sameness.after` is not empty, branch and bound
+            tries to prove this limit for the distances of all matching frames.
 
     Returns:
         The verdict, the matched joints and links, the differences, and an interval for every frame. The
@@ -445,7 +445,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sample_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:MAX_FARTHEST_FRAMES]]
-        # If all positions agree up to rounding, the search uses only one frame.
+        # If all sampled distances are within rounding, the search uses only one frame.
         # This frame has the largest upper bound on the angle.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
@@ -615,8 +615,8 @@ def _original_names(names: Sequence[str], usd_names: Sequence[str]) -> dict[str,
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose of B's root.
 
-    If a link on B's root body has the name of A's root, this link coincides with A's root. The same rule
-    holds with A and B exchanged. Otherwise, the roots coincide.
+    If a link on B's root body has the name of A's root, this link coincides with A's root. If a link on A's
+    root body has the name of B's root, this link coincides with B's root. Otherwise, the roots coincide.
 
     Returns:
         (4, 4) pose in A's root frame.
@@ -709,8 +709,8 @@ class JointComparison:
     If any condition does not hold, `same` reports the difference as not explained.
 
     Args:
-        errors: (joints, 3) error bounds of A, and of B; 0 for double precision. Columns: position (m),
-            rotation (rad), mimic rule (relative).
+        errors: For A, and for B: (joints, 3) bounds on the errors of position (m), rotation (rad) and mimic
+            rule (relative); 0 for double precision.
         base: (4, 4) pose of B's root in A's root frame.
     """
 
@@ -751,9 +751,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return P and the joints from P to a link.
+        """Return P, the nearest ancestor that is a common link, and the joints from P to a link.
 
-        Without a common ancestor, P is A's link in `start`.
+        If no ancestor is a common link, P is A's link in `start`.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -764,7 +764,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints after the last common ancestor.
+        """Return the joints from the last common ancestor of `start` and `end` to each of the two links.
 
         Returns:
             Joints to `start`, and to `end`.
@@ -810,7 +810,7 @@ class JointComparison:
             axis = list(
                 self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
             )
-            # A shifted link origin also shifts the axis.
+            # A wrong link origin also shifts the joint axis in the frame of P.
             # Therefore, the axes are compared in the link's frame.
             if axis and origin:
                 pair = tuple(screw.transform(inverse(T)) for screw, T in zip(pair, poses, strict=True))
@@ -836,7 +836,7 @@ class JointComparison:
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the joint screws and the link pose in the frame of P.
+        """Return the joint screws and the link pose in the frame of P, the nearest common link.
 
         Args:
             which: 0 for A, 1 for B.
