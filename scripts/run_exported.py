@@ -14,6 +14,7 @@ error bounds. For the first file of PyTorch code, the script also compiles the f
 
 import importlib
 import json
+import math
 import runpy
 import sys
 from collections.abc import Iterator
@@ -69,21 +70,24 @@ def check_compiled(scope: dict[str, Any]) -> float:
         inputs = [scope["GIVEN"][letter] for letter in letters]
         for kind, eps, table in (("float64", 2.0**-52, "WITHIN"), ("float32", 2.0**-23, "SINGLE")):
             values = scope["_values"](compiled, inputs, kind, "cpu")
-            share = max_error_ratio(values, scope["TRUE"][name], scope[table][name], eps)
-            largest = largest if share <= largest else share
+            largest = larger(largest, max_error_ratio(values, scope["TRUE"][name], scope[table][name], eps))
     return largest
 
 
 def max_error_ratio(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio; the ratio after a NaN replaces the NaN."""
+    """Return the largest ratio; NaN counts as larger than any number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):
             error, least = abs(x - float(y)), k * eps
             share = error / least if least else (0.0 if error == 0.0 else float("inf"))
-            if not share <= largest:
-                largest = share
+            largest = larger(largest, share)
     return largest
+
+
+def larger(x: float, y: float) -> float:
+    """Return the larger ratio; NaN counts as larger than any number."""
+    return x if math.isnan(x) or x >= y else y
 
 
 def main(library: str, paths: list[str]) -> None:
@@ -91,7 +95,7 @@ def main(library: str, paths: list[str]) -> None:
     for path in paths:
         ratios: dict[str, float] = {}
         for name, share in error_ratios(path, library, compiled):
-            ratios[name] = share if not share <= ratios.get(name, 0.0) else ratios.get(name, 0.0)
+            ratios[name] = larger(ratios.get(name, 0.0), share)
         compiled = compiled and not path.endswith("_torch.py")
         print(json.dumps({"file": Path(path).stem, "library": library, **ratios}), flush=True)
 

@@ -1,6 +1,7 @@
 """The check of exported files in a library's own environment."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 import urdfkin
 from scripts import check_exports
+from scripts.run_exported import max_error_ratio
 from urdfkin.export import exact
 
 #: An interpreter whose library accepts every file; of each run it stores the files that it was given.
@@ -83,3 +85,10 @@ def test_exact_code_is_checked_with_its_own_proof(monkeypatch: pytest.MonkeyPatc
     assert not found
     monkeypatch.setattr(exact, "make_exact_functions", lambda *given: made(*given[:-1], False))
     assert not check_exports.check_frame(robot, "tip", ["sympy-exact"])["good"]
+
+
+@pytest.mark.parametrize("numbers", [[math.nan, 1.0], [1.0, math.nan], [1.0, math.nan, 1.0]])
+def test_a_nan_is_the_largest_error_also_if_numbers_follow_it(numbers: list[float]) -> None:
+    ones = [1.0] * len(numbers)
+    assert math.isnan(max_error_ratio([numbers], [ones], [ones], 2.0**-52))
+    assert math.isnan(max_error_ratio([numbers, ones], [ones, ones], [ones, ones], 2.0**-52))
