@@ -656,8 +656,8 @@ class JointComparison:
         multiplier and offset of each mimic rule
 
     By the product of exponentials, these quantities determine the poses of all common links in every
-    configuration. `base_as_written` gives the pose of B's root. No joint direction, joint zero or tool frame is
-    changed.
+    configuration. `base_as_written` gives the pose of B's root. No joint direction, joint zero or tool frame
+    is changed.
 
     **Bound.** Exact values have an asterisk.
 
