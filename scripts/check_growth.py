@@ -190,7 +190,7 @@ if __name__ == "__main__":
     )
     option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
     option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
-    option("--one", type=int, help="check only one document of this size (bytes) in this process")
+    option("--one", type=int, help="check one document with this size in bytes, without further processes")
     options = parser.parse_args()
     if options.one is not None:
         print(measure_cost(options.words[0], options.one))

@@ -4,8 +4,8 @@
     python scripts/make_pages.py findings accuracy   # some pages
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
-with the output of this script. The accuracy study and the enclosures take minutes, so tests check only some
-numbers on these two pages. The tables and the picture of docs/performance.md show the numbers of
+with the output of this script. The pages on accuracy and enclosures take minutes to compute, so tests check
+only some numbers on these two pages. The tables and the picture of docs/performance.md show the numbers of
 docs/performance.json. `python scripts/benchmark.py --json docs/performance.json` measures these numbers.
 """
 

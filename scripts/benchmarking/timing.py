@@ -91,7 +91,7 @@ def check_agreement(tasks: Sequence[TimedTask], reference: TimedTask, title: str
 def measure_times(
     tasks: Sequence[TimedTask], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
-    """Return the times (ns) for one configuration, by round."""
+    """Return the time (ns) for one configuration in each round, by task."""
     times: dict[str, list[float]] = {task.label: [] for task in tasks}
     shuffled, order = list(tasks), random.Random(0)
     gc.disable()

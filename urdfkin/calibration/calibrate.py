@@ -157,7 +157,7 @@ class Calibration:
 
     @cached_property
     def written_changes(self) -> FloatArray:
-        """Changes (p,) of all parameters in `written_fit`, m and rad, even if the file cannot store them."""
+        """Changes (p,) of all parameters in `written_fit`, m and rad. The file can store only some."""
         return self._change(self.written_fit)
 
     @cached_property

@@ -188,7 +188,7 @@ def _library_input(robot: Robot) -> tuple[str, str]:
     """Return the input for other libraries.
 
     Returns:
-        URDF text, or path of an MJCF or USD file, and the format.
+        The URDF text, or the path of the MJCF or USD file; and the format, for example "urdf".
     """
     source = robot.origin.source
     if is_usd(source):

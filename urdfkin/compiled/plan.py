@@ -561,7 +561,7 @@ class _ProgramWriter:
                 self._add_instruction(Op.COLUMN, *rows, flags, at=multiplier_index)
 
     def _result_rows(self, f: int, row: int) -> list[int]:
-        """Return the scratch rows that contain the (6, nv) matrix, row by row."""
+        """Return the scratch row of each entry of the (6, nv) matrix, in C order."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.sum_columns[f] == np.arange(len(plan.columns))):

@@ -1,4 +1,4 @@
-"""Number types for the recursion of one configuration in plain Python, without compilation.
+"""Number types with which plain Python runs the recursion for one configuration.
 
 Compiled kernels use the number types of `urdfkin.compiled.machine.numbers`. Results with and without
 compilation are exactly the same doubles.

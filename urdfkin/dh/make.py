@@ -129,7 +129,8 @@ def make_dh_table(
             axes contains the sum. "each": row i contains the offset from joint i to joint i + 1.
         flip: Joints whose positive direction is reversed (`sense` is -1).
         first: "base": d_1 and theta_1 contain the translation along the first axis and the rotation about
-            this axis. "joint": d_1 and theta_1 are 0, and the base contains both (Craig's frame 0).
+            this axis. "joint": d_1 and theta_1 are 0, and the base transform contains this motion (Craig's
+            frame 0).
         sign: Direction of x. "theta": |theta| <= pi/2. "a": a >= 0. "alpha": alpha >= 0.
         slide: Position of a prismatic joint's axis. "drawn": the axis passes through the joint's origin.
             The first joint's axis passes through the base's origin instead. The last joint's axis passes

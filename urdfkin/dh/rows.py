@@ -300,7 +300,7 @@ def _parse_sense(value: Any, where: str) -> int:
             "`sense` must be 1 or -1",
             where=f"{where}, sense",
             found=repr(value),
-            remedy="write -1 to reverse the joint; write another factor as `multiplier` in `mimic`",
+            remedy="write `sense` -1 to reverse the joint; write any other factor as `multiplier` in `mimic`",
         )
     return int(number)
 

@@ -52,7 +52,7 @@ def markdown_text(words: str) -> str:
 
 
 def markdown_cell(words: str) -> str:
-    """Escape text for a cell of a Markdown table, in which no list or horizontal rule can begin."""
+    """Escape text for a cell of a Markdown table. In a cell, lists and horizontal rules need no escapes."""
     flat = escape_unprintable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())

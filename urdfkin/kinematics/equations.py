@@ -242,7 +242,7 @@ def turned_along(w, linear, angular):
 
 
 def end_moved(z, linear):
-    """7.85: derivative of z x d of joint i with respect to joint j > i.
+    """7.85: derivative of joint i's vector z x d with respect to joint j > i.
 
     linear:  linear part of column j
     """

@@ -109,7 +109,7 @@ _latex_equations = bind_equations(
 
 
 def latex(name: str) -> str:
-    r"""Return the LaTeX text of an equation's function.
+    r"""Return the LaTeX text of a function in `urdfkin.kinematics.equations`.
 
     >>> print(latex("point_acceleration"))
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)

@@ -161,7 +161,7 @@ def frame_rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def describe_as_written(sameness: Sameness) -> str:
-    """Describe the largest distance between a frame of model A and the matching frame of model B as given.
+    """Describe the largest distance between matching frames, if model B is compared without changes.
 
     The text is empty if rounding errors explain the distance. The text is also empty if `sameness.after` is
     empty, which means that no change brings model B closer to model A.

@@ -230,7 +230,9 @@ def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
         unit = _as_number(unit, "unit", where)
         if unit <= 0.0:
             raise InputError(
-                "`unit` must be positive: the number of units in one turn", where=where, found=safe_repr(unit)
+                "`unit`, the number of units in one turn, must be positive",
+                where=where,
+                found=safe_repr(unit),
             )
     return JointRule(name, sign, zero, unit)
 

@@ -403,9 +403,9 @@ def _first_axes(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
-    Each item is (pair, prismatic pairs before the pair, pairs from `later_axes`).
-    Every pair contains an axis of A and an axis of B.
-    Without a revolute pair, `pair` is the last prismatic pair.
+    A pair is an axis of A and an axis of B.
+    Each item is (revolute pair, prismatic pairs before this pair, pairs from `later_axes`).
+    Without a revolute pair, the first entry is the last prismatic pair.
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):

@@ -76,7 +76,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of later joint pairs that are compared.
+    """A limit on the number of joint pairs that decide between equally good choices.
 
     Several matchers can share a limit.
 

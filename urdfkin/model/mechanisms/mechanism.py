@@ -350,7 +350,7 @@ class Mechanism:
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """Yield one iterator for each run of consecutive joints.
 
-        The iterator yields the orders of the run's joint names that give the same motion.
+        The iterator yields each order of the run's joints that does not change the motion, as joint names.
         The current order comes first.
         """
         run: list[Edge] = []

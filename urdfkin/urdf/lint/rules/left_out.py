@@ -47,7 +47,7 @@ _SKIPPED_MARKUP = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b
 #: Keys are tags in the file; values are tags in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Beginning of a prim in a USD text file, or a delimiter.
-#: Delimiters are parentheses, braces, comments, strings, references and arrays.
+#: Delimiters are parentheses, braces, and the beginnings of comments, strings, references and arrays.
 _PRIM_OR_DELIMITER = re.compile(
     rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]'''
 )
