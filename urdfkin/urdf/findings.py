@@ -513,7 +513,7 @@ class Reporter:
             self.silenced_findings.append((finding, reason))
 
     def silence(self, comment_index: CommentIndex) -> None:
-        """Silence all warnings and notes that the file's comments name, also those that are added after this call.
+        """Silence all warnings and notes that the file's comments name, also those added after this call.
 
         An example of such a comment is `<!-- urdfkin: ignore[URDF503] the reason -->`.
         """
