@@ -230,9 +230,10 @@ def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
         unit = _as_number(unit, "unit", where)
         if unit <= 0.0:
             raise InputError(
-                "`unit`, the number of units in one turn, must be positive",
+                "`unit` must be positive",
                 where=where,
                 found=safe_repr(unit),
+                remedy="write the number of units in one turn, for example 360 for degrees",
             )
     return JointRule(name, sign, zero, unit)
 
