@@ -100,7 +100,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 
 
 def chain_urdf(joints: int, seed: int = 0) -> str:
-    """Return a chain of revolute joints with oblique axes."""
+    """Return a chain of revolute joints whose axes have random directions."""
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

@@ -89,7 +89,7 @@ class Interval:
         lower: Lower bound of the largest distance, m: the distance at `q_a` and `q_b`, minus rounding errors.
         upper: Proven upper bound of the distance, m; inf without a bound.
         radians: Proven upper bound of the angle between the frames.
-        radians_seen: The angle between the frames at `q_a` and `q_b`.
+        radians_seen: Angle between A's frame at `q_a` and B's frame at `q_b`, rad.
         q_a: Configuration of A.
         q_b: The corresponding configuration of B.
     """

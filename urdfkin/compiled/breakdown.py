@@ -111,9 +111,9 @@ class AccelerationBreakdown(Displayable):
 
 
 class _RelativeMotion(NamedTuple):
-    """Velocity or acceleration (n, 3) of a joint relative to its parent link.
+    """Velocity or acceleration of a joint relative to its parent link.
 
-    The vectors are in world axes.
+    `linear` and `angular` are (n, 3) arrays in world axes.
     """
 
     linear: FloatArray

@@ -76,7 +76,9 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """A limit on the number of joint pairs that decide between equally good choices.
+    """A limit on comparisons that decide between equally good choices.
+
+    Each comparison is of a joint of A and a joint of B, after the joints of the choice.
 
     Several matchers can share a limit.
 

@@ -201,7 +201,9 @@ _FIRST_QUATERNION_VERSION = (1, 1)
 
 @dataclass(frozen=True, slots=True)
 class ExactJoint:
-    """A joint's exact numbers in the URDF text.
+    """A joint's numbers, computed from the decimal numbers of the URDF text.
+
+    By default, the numbers are intervals.
 
     Attributes:
         R: Rotation in the parent link.
