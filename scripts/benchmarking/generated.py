@@ -3,7 +3,8 @@
 The benchmark compares the speed of urdfkin's kernels, which compute any robot, with the speed of this code.
 CasADi writes the textbook's equations as C code without loops and branches. The code contains the robot's
 constants, and omits products with 0 and 1. The code computes several configurations together, with SIMD
-vectors of doubles (`generated.c`). The time includes sine, cosine and the transposition of the arrays.
+vectors of doubles; `generated.c` contains the loop over the configurations. The time includes sine, cosine
+and the transposition of the arrays.
 
 The generated code does not check inputs. Its results are wrong if an input is not finite, or if an angle is a
 million turns. The generated code computes sine and cosine without urdfkin's correction of the last digit.

@@ -111,7 +111,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _check_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report all further links without a parent."""
+    """Return whether exactly one link has no parent; if not, report links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.has_errors:
