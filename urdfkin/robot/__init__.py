@@ -97,8 +97,8 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or a text must contain a value for every coordinate. Exception: if a text begins with the name
-    of a pose, the text needs only the values that differ from the pose.
+    A text that begins with the name of a pose needs only the values that differ from the pose. Every other
+    text, and every mapping, must contain a value for every coordinate.
 
     Methods that compute a quantity share these arguments:
 
@@ -252,7 +252,7 @@ class Robot(Displayable):
 
     @property
     def source(self) -> str:
-        """The source of the robot: a path, a catalogue name, `-` for standard input, or `<text>`.
+        """Source of the robot: a path, a catalogue name, `-` (standard input), `<text>`, `<table>`, ...
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").source
@@ -272,7 +272,7 @@ class Robot(Displayable):
 
     @property
     def path(self) -> str | None:
-        """Absolute path of the file; None for a robot that was given as text.
+        """Absolute path of the file; None for a robot from a text, standard input or an object.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").path.endswith("planar_two_link.urdf")
@@ -705,14 +705,14 @@ class Robot(Displayable):
     ) -> Robot:
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
 
-        A mimic joint is locked together with its mimicked joint. Pinocchio checks the returned robot with a
+        Locking a joint also locks every joint that mimics it. Pinocchio checks the returned robot with a
         reduced model of the whole URDF (`pinocchio.buildReducedModel`).
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable; all other joints are locked. If `lock` has no value for a
-                locked joint, the value is 0. If `lock` begins with the name of a pose, such as "ready", the
-                joint is locked at its value in this pose.
+            joints: The joints that remain movable; all other joints are locked. A locked joint without a
+                value in `lock` is at 0. If `lock` begins with the name of a pose, such as "ready", this joint
+                is at the pose's value instead.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -813,8 +813,8 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the pose of a frame relative to another frame, T_other_frame (..., 4, 4).
 
-        T_other_frame = T_world_other^-1 T_world_frame, with both placements from eq. 7.77. The result does
-        not depend on the motion of the base.
+        T_other_frame = T_world_other^-1 T_world_frame, with both placements from eq. 7.77. The motion of the
+        root link does not change T_other_frame.
 
         Args:
             frame: Name of a link or joint, or a list of names.
@@ -909,8 +909,8 @@ class Robot(Displayable):
         In LOCAL_WORLD_ALIGNED, J a + J-dot v is the classical acceleration, which `acceleration` returns. In
         LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in LOCAL
         and WORLD, J a + J-dot v is the *spatial* acceleration. Let p'' be the linear part of `acceleration`.
-        Let p' and w be the linear and the angular part of `velocity`. If all these results have the same
-        reference frame, the linear part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not
+        Let p' and w be the linear and the angular part of `velocity`. If all three methods receive the same
+        `reference`, the linear part of the spatial acceleration is p'' - w x p'. J a + J-dot v does not
         contain the acceleration that a moving base causes.
 
         >>> import urdfkin
@@ -950,8 +950,7 @@ class Robot(Displayable):
 
         - The linear rows are symmetric in i and j.
         - The angular part of H[..., i, j] minus that of H[..., j, i] is w_j x w_i, where w_i is the angular
-          part of column i of J. The difference is 0 for parallel axes. On a planar arm, all angular rows are
-          0.
+          part of column i of J. For parallel axes, w_j x w_i is 0. On a planar arm, all angular rows are 0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
@@ -979,10 +978,10 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the classical acceleration of a frame (..., 6), [linear; angular].
 
-        The linear part is p'', the second derivative of the position of the frame's origin. The linear part
-        of the spatial acceleration is p'' - w x p'. Pinocchio's function for the classical acceleration is
-        `getFrameClassicalAcceleration`. Gravity has no effect on the result; the result of `imu` includes
-        gravity.
+        The linear part is p'', the second derivative of the position of the frame's origin. In WORLD, p'' is
+        the acceleration of the body point at the world origin. The linear part of the spatial acceleration is
+        p'' - w x p'. Pinocchio's function for the classical acceleration is `getFrameClassicalAcceleration`.
+        Gravity has no effect on the result; the result of `imu` includes gravity.
 
         In LOCAL_WORLD_ALIGNED and without `base`, the result is J a + J-dot v. Here `jacobian` returns J, and
         `jacobian_rate` returns J-dot. `acceleration_breakdown` lists the contribution of each joint.
@@ -1123,9 +1122,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. If Pinocchio
-                checks the call, the smallest accepted distance is at least the rounding error of the rotation
-                (about 1e-13 rad). A quaternion has no singularity.
+            RepresentationSingularityError: a configuration is nearer to the singularity than `nearest`. If
+                Pinocchio checks the call, the smallest accepted distance is at least the rounding error of
+                the rotation (about 1e-13 rad). A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1240,9 +1239,10 @@ class Robot(Displayable):
 
         The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding. The inputs of these
         equations are the decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of
-        an interval are doubles. Nearly always, no other double lies between the two ends. The result also
-        states whether urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than
-        1 ms for each joint between the root link and the frame.
+        an interval are doubles. With the default `digits`, the two ends are nearly always neighbouring or
+        equal; an interval around 0 is about 1e-38 wide. The result also states whether urdfkin's and
+        Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each joint between
+        the root link and the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1252,13 +1252,14 @@ class Robot(Displayable):
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
             digits: Decimal digits of the interval arithmetic, at least 15. None: 30 plus the number of joints
-                between the root link and the frame. With 15 digits, the intervals are about as wide as the
-                rounding errors of doubles.
+                between the root link and the frame. With 15 digits, many other doubles can lie between the
+                two ends of an interval.
             hessian: Whether to compute intervals for the Hessian too; this takes less than 0.1 ms for each
                 pair of joints.
 
         Raises:
-            InputError: an argument is a batch or has a wrong length, or `digits` is below 15.
+            InputError: an argument is a batch, has a wrong length or is not finite, or `digits` is not in 15
+                to 10,000.
             UnknownNameError: the frame or reference does not exist.
 
         >>> import urdfkin
@@ -1310,7 +1311,7 @@ class Robot(Displayable):
         """Return the fastest evaluator of one frame: machine code for this robot.
 
         At the first call of a quantity, the system's C compiler compiles the code in a few seconds. A cache
-        stores the compiled code for later programs on the same machine. At the first call, urdfkin also
+        stores the compiled code for later programs on the same machine. The first call of each quantity also
         compares the compiled code with Pinocchio, unless the robot was loaded with `verify=False`. Without a
         C compiler, the evaluator uses Numba. The class `CompiledFrame` documents the evaluator's methods.
 
@@ -1361,7 +1362,8 @@ class Robot(Displayable):
             form: Source of the pose: "tree": the joints of the URDF. "dh": the Denavit-Hartenberg table from
                 `base_frame` to the frame. "screws": the product of exponentials from `base_frame` to the
                 frame. With "dh" and "screws", `base_frame` takes the place of the world frame.
-            name: Prefix of the function names; None: the names of the robot and the frame.
+            name: Name for the file of the code; in C, also the prefix of function names. None: the names of
+                the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code contains the word UNVERIFIED.
 
@@ -1393,9 +1395,9 @@ class Robot(Displayable):
         """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
 
         The module is an object of the class `Kinematics` in `export("torch", ...)`. By default, `module(q)`
-        returns the placement (..., 4, 4). Each quantity is a method of the module. Tensors may have any batch
-        axes, any floating type and any device. PyTorch, which must be installed, can compute derivatives of
-        the results.
+        returns the placement (..., 4, 4). Each quantity is also a method: `module.jacobian(q)`. Tensors may
+        have any batch axes, any floating type and any device. PyTorch, which must be installed, can compute
+        derivatives of the results.
 
         Args:
             frame: As in `export`.
@@ -1481,8 +1483,8 @@ class Robot(Displayable):
         """Return the Denavit-Hartenberg table of the path between two frames, checked with Pinocchio.
 
         The table's methods take only the coordinates of the joints in the table, in the order of
-        `table.joint_names`. `robot.select(table, q)` selects these coordinates from q.
-        `urdfkin.dh.make_dh_table` explains the arguments in full.
+        `table.joint_names`. With `table = robot.dh(...)`, `robot.select(table, q)` selects these coordinates
+        from q. `urdfkin.dh.make_dh_table` explains the arguments in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1503,9 +1505,10 @@ class Robot(Displayable):
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
             slide: Rule for the position of a prismatic joint's axis. "drawn": the axis passes through the
-                joint's origin in the URDF. "minimal": the axis passes through the origin of a neighbouring
-                revolute joint, so the length a between the two axes is 0. The previous joint is used only if
-                the next joint is not revolute.
+                joint's origin in the URDF. `make_dh_table` lists exceptions, such as the first joint.
+                "minimal": the prismatic axis passes through the origin of a neighbouring revolute joint, so
+                the length a between these two axes is 0. The previous joint is used only if the next joint is
+                not revolute.
             like: A published table. The result copies the positive joint directions, the directions of the x
                 axes, and the offsets d along parallel axes from this table. The result also copies theta of
                 the first and last row, and a and alpha of a standard table's last row. All other numbers come
@@ -1690,7 +1693,7 @@ class Robot(Displayable):
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # A plain str with the default reference is its own key.
         # The key then contains no `Reference`: the hash of an enumeration member is slow.
-        # Every other key contains the class of `frame`, for example `LinkFrame`.
+        # Every other key is a tuple that begins with the class of `frame`, such as `LinkFrame`.
         # `LinkFrame("link:a")` and the str "link:a" are equal, but can name different frames.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    The methods have the same names and arguments as the methods of `Robot`. The target program's order
-    applies to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's
-    units apply to q, v and a. Pinocchio checks each result before the conversion.
+    Each method has the name and the argument order of a method of `Robot`. The target program's order applies
+    to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
+    apply to q, v and a. Pinocchio checks each result before the conversion.
 
     Attributes:
         robot: The robot.

@@ -152,8 +152,8 @@ class Trajectory:
         notes: Remarks for the user, one line each. For example, a remark names a joint whose angle was
             unwrapped.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
-        errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
-            if there are too few samples.
+        errors: Estimated largest error of v and estimated largest error of a. None for given or exact v and
+            a, and for fewer than 5 samples.
 
     >>> import urdfkin
     >>> make_line_trajectory(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
@@ -271,7 +271,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read the samples of a file like `read_trajectory`, but without computing missing velocities."""
+    """Read a file's samples like `read_trajectory`; a missing array t, v or a stays None."""
     archive = path.suffix.lower() == ".npz"
     data = _read_npz(path, conversion or robot) if archive else _read_table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -369,7 +369,7 @@ def _read_table(robot: Robot, path: Path, conversion: Conversion | None) -> dict
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of q, v or a by name, such as "m/s". A quaternion has the unit ""."""
+    """Return a dict from each number's name in q, v or a to its unit, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -538,7 +538,7 @@ def _parse_unit(text: str, where: str, expected: str) -> str:
 
 def _convert_to_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
-        # For k * 15 degrees, `radians_from_degrees` returns exactly k * pi / 12.
+        # For k * 15 degrees, `radians_from_degrees` returns the double k * math.pi / 12.
         return np.fromiter(map(radians_from_degrees, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
@@ -629,8 +629,8 @@ class UnwrappedSamples:
 def unwrap_angles(tree: KinematicTree, q: FloatArray) -> UnwrappedSamples:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
-    Between two samples, a joint is assumed to turn in the shorter direction. If the angles of a joint span
-    more than one turn, the angles are not wrapped, so they stay unchanged.
+    Between two samples, a joint is assumed to turn in the shorter direction. If the samples of an angle span
+    more than one turn, the samples stay unchanged.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
