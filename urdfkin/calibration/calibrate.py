@@ -1,7 +1,8 @@
 """Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
-A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameters that changed by more than
-two standard deviations are fitted again and written. The other parameters keep their original values.
+A fit that is not plausible (`plausible.py`) is refused. Without `write_all`, joint parameters that changed by
+at most two standard deviations get their original values. The other parameters are fitted again, and written
+if the file can store them. These include all identifiable parameters of base and tool.
 
 `read_poses` reads measured poses:
 
@@ -91,7 +92,8 @@ class Calibration:
     Attributes:
         robot: The robot before the calibration.
         model: The model with the parameters to fit.
-        identification: The parameters that are identifiable from the measured poses.
+        identification: The parameters that are identifiable from the measured poses. Without poses, the same
+            as `general_identification`.
         general_identification: The parameters that are identifiable from random poses.
         full_fit: The fit; None without poses.
         base_tool_fit: A fit of base and tool alone.
@@ -267,7 +269,7 @@ def calibrate(
         write_all: Whether to also write changes of less than two standard deviations.
 
     Raises:
-        InputError: an array has a wrong shape, there are too few poses, or the positions are not in metres.
+        InputError: an array has a wrong shape, there are no poses, or the positions are not in metres.
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.

@@ -50,7 +50,7 @@ A pose is an **outlier** if its statistic is too large:
     limit                     without outliers, any statistic exceeds it with a probability of about 1 %
 
 One outlier can hide another, so each step removes only the largest outlier and fits the other poses again.
-The steps end when no outlier is left.
+The steps end when no outlier is left, or at the maximum number of outliers.
 
 **Start values.** Before the fit, start values of base and tool are computed from the measured poses.
 
@@ -65,8 +65,8 @@ The steps end when no outlier is left.
 
 If only positions are measured, the base and the target's position on the tip are unknown. A known target
 position determines the base's rotation directly. A known rotation of the base makes the equations for the
-positions of base and target linear. The module therefore computes the rotation and the two positions
-alternately.
+positions of base and target linear. The module therefore repeats two steps: the base's rotation, then the
+positions of base and target.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def join_names(names: Iterable[str], limit: int) -> str:
     return ", ".join(every[:limit]) + (f" and {len(every) - limit} more" if len(every) > limit else "")
 
 
-#: A fit can be checked if its total redundancy is at least this number.
+#: `Fit.has_redundancy` is true if the total redundancy is at least this number.
 #: Without rounding errors, the total redundancy is an integer.
 #: Therefore, 0.5 separates 0 from 1 in spite of rounding errors.
 _MIN_REDUNDANCY = 0.5

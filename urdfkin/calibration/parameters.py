@@ -349,7 +349,8 @@ class _ModelBuilder:
         preferences: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
         index_of = {(p.element, p.is_base_or_tool, p.name): k for k, p in enumerate(self.parameters)}
-        # Base and tool have the highest preference, because their values are unknown before the fit.
+        # If parameters of base or tool and of a joint have the same effect, base or tool is fitted.
+        # The values of base and tool are unknown before the fit.
         # The parameters of the joints are nearly known before the fit.
         owners = sorted(
             dict.fromkeys((p.element, p.is_base_or_tool) for p in self.parameters), key=lambda one: not one[1]

@@ -59,7 +59,7 @@ _LARGE_ORIENTATION_ERROR = 0.2
 #: The first limit is for the rms position error, as a fraction of the reach.
 #: The second limit is for the rms orientation error, rad.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
-#: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
+#: Largest plausible tilt of a joint's axis (rad), and largest plausible change of a gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Joint values are rounded to multiples of this number (rad or m) before configurations are compared.
 #: Two configurations with equal rounded values count as one configuration.

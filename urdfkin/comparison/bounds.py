@@ -412,7 +412,7 @@ def tighten(
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
     # An unlimited revolute joint repeats its poses after one turn.
-    # The unlimited range of any other joint cannot be divided into boxes.
+    # Boxes cover an unlimited range only for revolute joints with the multiplier 1 or -1.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)

@@ -236,8 +236,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", as_json_data(document))
 
 
-#: Attributes of `Sameness` that the certificate contains.
-#: The entries of the certificate have the names of the attributes.
+#: The certificate copies these attributes of `Sameness`, under the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written",

@@ -109,7 +109,8 @@ class Interval:
 #: For "limits", a tuple contains the lower and the upper limit.
 #: For "idle", a tuple contains the type of a joint that never moves, and the joint's value (rad or m).
 #: For "only in A" and "only in B", a tuple contains the names of links.
-#: A `Mimic` is a mimic rule; None means that the parameter has no value.
+#: A `Mimic` is a mimic rule.
+#: None: the joint or link has no value of this parameter.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -429,7 +430,7 @@ class Sameness(Displayable):
     def up_to_single(self) -> bool:
         """Whether single precision explains every difference in motion.
 
-        Each joint is checked separately. For models without a difference, the result is False.
+        Each joint is checked separately. For the verdict `Verdict.SAME`, the result is False.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").up_to_single

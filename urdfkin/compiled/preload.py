@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 #: The module's docstring describes the action after each of these times.
 LOAD_AFTER, BACKGROUND_AFTER, COMPILE_AFTER = 0.3, 1.0, 3.0
 #: The first kernel is loaded when plain Python has taken the time `LOAD_AFTER`.
-#: Each further kernel is loaded when plain Python has taken this time (s).
+#: Each further kernel is loaded when its plain Python version has taken this time (s).
 _LOAD_NEXT_AFTER = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
 _SECONDS_SAVED = 5e-5

@@ -124,7 +124,7 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """Run the test vectors in double and single precision.
 
-    Without a GPU, only the CPU functions of a CUDA file are checked.
+    Of a CUDA file, the GPU functions are checked only if nvcc and a GPU are available.
     """
     name = _find_program_name(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")

@@ -4,8 +4,8 @@ The first call of a quantity compiles exported C code with the system's compiler
 with Pinocchio. Without a C compiler, urdfkin uses the forward recursion, which Numba compiles.
 
 A cache stores the machine code with checksums. The key consists of the C code, the compiler and the
-processor. The code is loaded from memory, because another program could change a file after the test of the
-checksum.
+processor. On Linux, the code is loaded from memory, because another program could change a file after the
+test of the checksum. Other systems load the code from a temporary file.
 """
 
 from __future__ import annotations

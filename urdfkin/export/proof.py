@@ -161,7 +161,7 @@ def compare_with_pinocchio(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    # A copy of the verifier makes the checks, because the user's certificate must not include these checks.
+    # `Robot.certificate` must not count these checks, so a copy of the verifier makes them.
     checker = copy(verifier)
     samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
     for function in functions:

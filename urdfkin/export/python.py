@@ -1,6 +1,6 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. A `Dialect` describes all other code for one library.
+The expressions are the same for all libraries. A `Dialect` describes the code around them for one library.
 """
 
 from __future__ import annotations

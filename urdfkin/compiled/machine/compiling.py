@@ -55,7 +55,7 @@ class KernelCache(_NullCache):  # type: ignore[misc]
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
             # The file's checksum is correct, but another version of Numba may have written the file.
-            # Reading such a file can cause any error.
+            # Reading a file from another version can raise any exception.
             except Exception as error:
                 report_damaged(path, f"{type(error).__name__}: {error}")
         self._begin()

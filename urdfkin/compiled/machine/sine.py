@@ -76,7 +76,7 @@ def _small_sine_cosine(context: Any, x: Any) -> Any:
         # Let d be the double nearest to pi/2.
         # If n != 0, x and n d are multiples of 2^-53.
         # |x - n d| is below 1, so this difference is exact.
-        # If n is 0, the difference is x.
+        # If n = 0, then x - n d = x, which is also exact.
         # `r_error`: rounding error of r. `z_error`: rounding error of z = r^2.
         near = build_fma(builder, n, all_lanes(-PI_2), x)
         r = build_fma(builder, n, all_lanes(-PI_2_REST), near)
