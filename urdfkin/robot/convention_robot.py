@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    Each method has the name and the argument order of a method of `Robot`. The target program's order applies
+    Each method has the name and the arguments of a method of `Robot`. The target program's order applies
     to q, v and a, to the columns of Jacobians, and to the rows of six-vectors. The target program's units
     apply to q, v and a. Pinocchio checks each result before the conversion.
 
@@ -83,9 +83,9 @@ class ConventionRobot:
         """Return T_world_frame (..., 4, 4); see `Robot.placement`."""
         return self._call(self.robot.placement, (q,), frame, **options)[1]
 
-    def relative_placement(self, q: ArrayLike, frame: Any, other: Any, **options: Any) -> FloatArray:
-        """Return the pose (..., 4, 4) of `frame` in the frame `other`; see `Robot.relative_placement`."""
-        return self._call(self.robot.relative_placement, (q,), frame, other, **options)[1]
+    def relative_placement(self, q: ArrayLike, frame: Any, relative_to: Any, **options: Any) -> FloatArray:
+        """Return the pose (..., 4, 4) of `frame` relative to a frame; see `Robot.relative_placement`."""
+        return self._call(self.robot.relative_placement, (q,), frame, relative_to, **options)[1]
 
     def velocity(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *arguments: Any, **options: Any

@@ -1,5 +1,6 @@
 """Conversions of q, v, a and Jacobians between conventions: laws, user files, errors, maps of `same`."""
 
+import inspect
 import itertools
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from urdfkin.model.conventions.convention import JointRule, parse_convention, sp
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.robot.convention_robot import ConventionRobot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, Quantity
@@ -466,3 +468,15 @@ def test_a_convention_that_is_written_as_toml_is_read_back(name: str) -> None:
     assert parse_convention(as_toml(how), "text", how.name) == how
     given = replace(how, order="given", joints=("m", "c"))
     assert parse_convention(as_toml(given), "text", how.name) == given
+
+
+def test_the_methods_of_a_robot_in_a_convention_have_the_argument_names_of_the_robot() -> None:
+    shared = [
+        name for name in vars(ConventionRobot) if name[0] != "_" and inspect.isfunction(vars(Robot).get(name))
+    ]
+    assert {"placement", "relative_placement", "velocity", "acceleration"} <= set(shared)
+    for name in shared:
+        theirs = inspect.signature(getattr(ConventionRobot, name)).parameters.values()
+        named = [one.name for one in theirs if one.kind is one.POSITIONAL_OR_KEYWORD]
+        ours = list(inspect.signature(getattr(Robot, name)).parameters)
+        assert named == ours[: len(named)], name
