@@ -42,7 +42,8 @@ class CatalogueEntry:
     Attributes:
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
-        mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
+        mimic: Whether the mimic rules of the URDF are valid. If False, urdfkin ignores all
+            mimic rules by default.
         mimic_problem: The reason why the mimic rules of the URDF are invalid; None if the rules are valid.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
         is_bundled: True for a robot in urdfkin's own files, False for a robot of example-robot-data.

@@ -60,8 +60,8 @@ class AllowedPaths:
         """Return the paths that urdfkin may read to load the robot file `path`.
 
         `roots` contains the folder, the ROS package and the git repository of the file. `roots` also contains
-        the folders in `package_paths`, and the files and folders that `arguments` names. A package,
-        repository or argument is ignored if it is the home folder or `/`.
+        the folders in `package_paths`, and the files and folders that `arguments` names. The home folder
+        and `/` do not count as package, repository or argument.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for file_name in ("package.xml", ".git"):

@@ -168,7 +168,8 @@ class Finding:
         file: The name of the file as the user wrote it, or `<text>`, `<stdin>`.
         line: Line number, from 1.
         column: Column number in characters, from 1.
-        element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
+        element: The tag of the joint, link or other child of `<robot>` with the problem; None for the whole
+            file.
         name: The name of the link, joint or material, or None.
         pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
             differently. Pinocchio then cannot verify any result of the robot.
@@ -296,7 +297,7 @@ class UrdfError(UrdfkinError, ValueError):
     """A URDF has errors. The message lists the first five errors, each with file, line and column.
 
     Attributes:
-        findings: All findings of the file by line, warnings and notes included.
+        findings: All findings of the file, sorted by line, warnings and notes included.
 
     >>> import urdfkin
     >>> try:
@@ -422,7 +423,7 @@ MAX_SEARCHES = 20
 #: number of names, and number of compared pairs of characters.
 MAX_CANDIDATES, MAX_COMPARED_PAIRS = 5_000, 250_000
 
-#: If a code has at least `MIN_FOLDED` warnings or notes, one finding represents all of them.
+#: With `fold`, one finding represents `MIN_FOLDED` or more warnings or notes with one code.
 #: For the codes URDF7xx, the minimum is `MIN_FOLDED_EXTRAS`.
 #: The codes URDF7xx refer to inertials, shapes, meshes and materials.
 #: Kinematics does not use these elements.
@@ -482,8 +483,8 @@ class Reporter:
         """Add a finding about an element, or about the line and column `position`.
 
         The finding names the child of `<robot>` that contains the element. If `misplaced` is True, the
-        finding names the element itself. If several warnings or notes are combined into one finding,
-        the finding with the greatest `weight` represents the others.
+        finding names `element` instead of this child. If several warnings or notes are combined into one
+        finding, the finding with the greatest `weight` represents the others.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -546,7 +547,10 @@ class Reporter:
     def findings(
         self, *, fold: bool = True, is_reported: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line; `is_reported` is called once for each finding, in file order."""
+        """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
+
+        `is_reported` is called once for each completely stored finding, in file order.
+        """
         pairs = [pair for group in self._groups.values() for pair in group.pairs]
         if is_reported is not None:
             pairs.sort(key=lambda pair: _sort_key(pair[0]))

@@ -200,8 +200,8 @@ class _ModelReader:
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
         """For each body whose frame is a joint frame, yield the index of the joint and of the body.
 
-        The bodies are in reverse order. If a joint has several bodies, a dictionary therefore keeps the first
-        of these bodies.
+        The bodies are in reverse order. A dictionary of the pairs
+        therefore keeps the first body of each joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

@@ -157,7 +157,7 @@ class Mjcf:
         """Return the sum of |q| + |ref| (rad) over the hinges of each frame, shape (n, frames).
 
         The hinges of a frame are the hinges between the world and the frame. A hinge is omitted if its
-        reference value `ref` is zero. Bounds on rounding errors contain this sum.
+        reference value `ref` is zero. `mjcf_placement_bound` uses this sum.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -177,9 +177,11 @@ class Mjcf:
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
         """Return one number for each frame, shape (n, frames).
 
-        `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The numbers of a body's frame
-        are the body's column of `at_body`. The numbers of a site's frame are the column of the site's body
-        plus the constant `own[site]`.
+        `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The columns of the
+        result are:
+
+        - for body i: `at_body[:, i]`
+        - for a site on body i: `at_body[:, i] + own[site]`
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -204,12 +206,12 @@ class Mjcf:
         return out
 
     def rule_scales(self, q: FloatArray) -> FloatArray:
-        """Return a number for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
+        """Return a scale for each equality, shape (n, equalities); 0 if the equality is not a mimic rule.
 
-        The rounding error of a mimic rule is at most `MJCF_RULE_ROUNDINGS` * `EPS` * the returned number.
+        The rounding error of a mimic rule is at most `MJCF_RULE_ROUNDINGS` * `EPS` * scale.
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
-        s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
+        s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The scale is s(y) (k + 1), where k is the number of
         rules from y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
@@ -487,7 +489,7 @@ class _MjcfReader:
             self._add_fixed_joint(T, here, link)
 
     def _make_joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return the joint with index `j`, and the pose of the joint's body in the joint frame.
+        """Convert MuJoCo's joint `j`; return the joint and the pose of its body in the joint frame.
 
         T is the pose of the joint frame in the parent link when the joint has its reference value `ref`.
         """

@@ -139,7 +139,10 @@ def _check_declaration(report: Reporter, text: bytes, declared: str | None) -> b
 
 
 def _find_codec(name: str) -> str | None:
-    """Return Python's lower-case name of an encoding; None for an unknown encoding."""
+    """Return Python's lower-case name of an encoding without hyphens, except for `utf-8`.
+
+    Return None for an unknown encoding.
+    """
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
     except LookupError:
@@ -170,7 +173,7 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 #: Maximum depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
 
-#: Number of bytes that expat parses in one call.
+#: Maximum number of bytes that expat parses in one call.
 _CHUNK_SIZE = 1_000_000
 
 #: Once this many characters of an element's text are stored, further text is ignored.
@@ -704,7 +707,8 @@ class JointReader:
     ) -> str | None:
         """Return the value of a required attribute, and report a missing attribute.
 
-        If `number` is False, the function also reports an empty value.
+        If `number` is False, the function also reports an empty value. If `number` is True, `NumberReader`
+        reports an empty value.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):

@@ -34,7 +34,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 
 
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
-    """Return each joint with its parent link and its child link.
+    """Return each joint with the names of its parent link and child link.
 
     Raise InputError if mimic joints form a cycle, and UnknownNameError if a mimicked joint does not exist.
     """
@@ -100,9 +100,9 @@ def _make_limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return a rule for each mimic joint, by joint name. The mimicked joint of each rule is independent.
 
-    For example, z mimics y, and y mimics x. The returned rule of z is z = m2 (m1 x + b1) + b2. urdfkin and
-    Pinocchio combine rules in the same order: first the rule of y, then the rule of z. Therefore the rounding
-    errors of urdfkin and Pinocchio are equal.
+    Example of a chain: z mimics y, and y mimics the independent joint x. The returned rule of z is
+    z = m2 (m1 x + b1) + b2. Both urdfkin and Pinocchio start with the rule of y, then combine it with the
+    rule of z. Therefore the rounding errors of urdfkin and Pinocchio are equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

@@ -90,9 +90,9 @@ class Element:
 
     @property
     def top_element(self) -> Element:
-        """The child of `<robot>` that contains this element.
+        """The child of `<robot>` that is or contains this element.
 
-        For `<robot>` and its children, `top_element` is the element itself.
+        For `<robot>`, `top_element` is `<robot>` itself.
         """
         return self.top_ancestor or self
 

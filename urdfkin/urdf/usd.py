@@ -64,7 +64,7 @@ _LARGEST_SINGLE = float(np.finfo(np.float32).max)
 #: Rounding changes the length of a stored quaternion by at most u.
 #: The cosine between two axes then changes by at most 4 u.
 _MAX_SHEAR = 14.0
-#: A revolute joint hardly moves if its limits are at most this angle (degrees).
+#: A revolute joint hardly moves if max(|lower|, |upper|) is at most this angle (degrees).
 #: The finding USD303 (limits that are probably in radians) omits joints that hardly move.
 _NEGLIGIBLE_DEGREES = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
@@ -464,8 +464,8 @@ class _StageReader:
     def _read_value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute.
 
-        If the value is missing or blocked, return the default of the attribute. If the attribute or the
-        default does not exist, return None.
+        If the value is missing or blocked, return the default of the attribute. Return None if
+        the attribute does not exist, or has neither value nor default.
         """
         attribute = prim.GetAttribute(name)
         if not attribute:
@@ -555,7 +555,7 @@ class _StageReader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction in "physxMimicJoint:rotX:referenceJoint" may differ from the joint's direction.
+            # The direction rotX in "physxMimicJoint:rotX:referenceJoint" may differ from the mimic joint's.
             own = _MIMIC_RELATIONSHIP.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -573,7 +573,7 @@ class _StageReader:
                     self._report("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # A joint that is not in the tree was already reported.
+        # `_read_joint` already reported each joint that it skipped.
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 

@@ -42,15 +42,16 @@ def check(
     xacro_args: Mapping[str, object] | None = None,
     fold: bool = False,
 ) -> Findings:
-    """Check a URDF and return the findings by line.
+    """Check a URDF and return the findings, sorted by line.
 
     The function also checks that the packages and mesh files in the URDF exist. No mesh is opened.
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
         limits: Limits on the size of the file, its elements, names and numbers.
-        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
-            are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
+        mimic: Whether mimic joints follow their mimicked joints. If False, the codes
+            URDF520 to URDF527 are notes. The default is True, except for robots of the catalogue with invalid
+            mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with this argument.
         xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
             of the expanded text.

@@ -102,8 +102,8 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return a baseline as text.
 
-    If the file `path` contains an older baseline, the function also copies entries of the older baseline. An
-    entry is not copied if the file in the entry is one of `files` or no longer exists.
+    If the file `path` contains an older baseline, the function also copies entries of the older baseline. The
+    function does not copy entries about a file in `files` or about a deleted file.
     """
     counts = Counter(key_of(finding, relative_path(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -214,7 +214,8 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     """Return whether a pattern matches a file or a folder above it.
 
     A pattern without a slash is compared with each folder and file name of the path, relative to `root`. A
-    pattern with a slash is compared with the relative path. `*` matches any characters, including slashes.
+    pattern with a slash is compared with the relative paths of the file and its folders. `*` matches any
+    characters, including slashes.
 
     >>> matches("robots/old/arm.urdf", ["old"], Path()), matches("robots/arm.urdf", ["robots/o*"], Path())
     (True, False)
@@ -274,8 +275,8 @@ def find_known_findings(
 
     An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
     If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.
-    Second, a mesh file that exists in the older version may be missing now. If the URDF contains the name of
-    a deleted file, all findings about missing meshes are new.
+    Second, a mesh file that exists in the older version may be missing now. If the URDF contains the
+    name of a file deleted since that version, all findings about missing meshes are new.
     """
     path = Path(text.source) if is_xacro(text.source) else find_local_path(text)
     if path is None:
@@ -339,6 +340,6 @@ def _walk_folder(folder: Path, root: Path, include: Sequence[str], exclude: Sequ
 
 
 def _expand_pattern(pattern: str) -> list[str]:
-    # Path.glob accepts neither absolute patterns nor "..".
+    # Path.glob does not accept absolute patterns.
     names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
     return sorted(unambiguous_path(name) for name in names if not is_folder(name))

@@ -41,7 +41,7 @@ _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
 def check_dialect(report: Reporter, root: Element) -> None:
-    """Report a robot without a name or links, unexpanded xacro, includes and a default namespace."""
+    """Report a missing name, missing links, unexpanded xacro, includes and a default namespace."""
     _check_namespaces(report, root)
     name = root.attributes.get("name")
     if name is None:
@@ -154,7 +154,7 @@ EXTENSIONS = frozenset(_COMMON_EXTENSIONS.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: If a line has no colon, the attributes of the element are not checked.
-#: If an element has no line, its content is not checked.
+#: If this table has no line for an element, the content of the element is not checked.
 _VOCABULARY = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -256,7 +256,7 @@ def walk_outside_extensions(element: Element) -> Iterator[Element]:
 
 
 def _is_link_or_joint(element: Element) -> bool:
-    """Return whether an element is probably a link or joint."""
+    """Return whether an element is a link or joint, possibly with a misspelt tag."""
     tag = nearest_tag(element.tag, _LINK_OR_JOINT) if len(element.tag) < _MAX_TAG_LENGTH else None
     if tag == "link":
         return "name" in element.attributes

@@ -471,7 +471,10 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a joint (+- pi for a continuous joint), or None."""
+    """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
+
+    Return None for other joints, without `<limit>`, and unless lower < upper.
+    """
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -510,8 +513,8 @@ SUSPICIOUS_LENGTH = 100.0
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 SUSPICIOUS_ROBOT_SIZE = 1e-4
 
-#: A limit is probably in degrees if it is a whole number from `SUSPICIOUS_LIMIT` to `PLACEHOLDER_LIMIT`.
-#: `PLACEHOLDER_LIMIT` itself is excluded.
+#: A limit is probably in degrees if it is a whole number, and
+#: `SUSPICIOUS_LIMIT` <= |limit| < `PLACEHOLDER_LIMIT`.
 #: For a joint without limits, some exporters write limits of at least `PLACEHOLDER_LIMIT`.
 SUSPICIOUS_LIMIT, PLACEHOLDER_LIMIT = 30.0, 1000.0
 
@@ -694,7 +697,7 @@ def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return an upper bound (m) on the distance from each link to its descendants."""
+    """Return, for each link, an upper bound (m) on the distance to its descendants."""
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})
     for link in order:
