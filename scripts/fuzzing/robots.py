@@ -16,7 +16,7 @@ from urdfkin.urdf.records import FURTHER_LIMITS
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
-#: Names that resemble internal names of urdfkin or Pinocchio.
+#: Names for random robots: internal names of urdfkin or Pinocchio, and similar names.
 INTERNAL_NAMES = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
