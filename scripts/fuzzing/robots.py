@@ -205,7 +205,7 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Most random robots are chains, because a chain accumulates the largest rounding errors.
+        # About half of the random robots are chains, because a chain accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",
