@@ -10,9 +10,9 @@ other ten changes, `same` must find that robot and copy differ. The change `roun
 to four digits leaves some robots unchanged, so every verdict is accepted.
 
 For each of these ten changes, the script also checks the interval of `same` for the largest distance between
-a frame of the robot and the corresponding frame of the copy. An independent global search looks for this
-distance. The script computes the distance with fifty digits from the decimal numbers in the two URDF texts.
-The distance must lie in the interval.
+a frame of the robot and the corresponding frame of the copy. An independent global search maximizes
+the distance. The script computes the distance with fifty digits from the decimal numbers in the two URDF
+texts. The distance must lie in the interval.
 
 Exit 1: a distance is outside its interval, or a verdict is wrong.
 """

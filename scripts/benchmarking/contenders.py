@@ -174,7 +174,7 @@ def _compute_part(start: int, stop: int) -> None:
     _worker_state["loop"](out, *inputs)
 
 
-# Some libraries order rows or coordinates differently. The measured time does not include the reordering.
+# Some libraries order rows or coordinates differently. Times exclude the reordering of inputs and results.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]

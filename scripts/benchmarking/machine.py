@@ -1,6 +1,6 @@
 """Describe the machine; measure the memory of a batch and the time of a first use in new processes.
 
-This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet.
+This module runs itself in a new process, which has loaded no kernel and no library yet.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Count the additions and multiplications that compute a result for one configuration.
 
 The module calls urdfkin's functions with objects that record each operation. A fused multiply-add counts as
-two operations, because manufacturers also count two for the peak performance of a processor. A change of sign
+two operations, because manufacturers also count two for the peak performance of a processor. The negation -x
 does not count. A product with the constant 0 or 1 does not count.
 """
 

@@ -80,7 +80,7 @@ class TextTable:
 
 
 def format_number(x: float) -> str:
-    """Format a number with three digits and without an exponent."""
+    """Format a number without an exponent: 0.01, 1.23, 12.3, 123 or 12,345."""
     digits = 2 if abs(x) < 10 else 1 if abs(x) < 100 else 0
     return f"{x:,.{digits}f}"
 

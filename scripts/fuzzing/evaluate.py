@@ -29,13 +29,13 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 #: Codes of findings about huge numbers.
 #: With these findings, results may be inf or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Maximum number of frames in one call.
+#: Maximum number of links and joints whose frames one call computes.
 FRAMES_PER_CALL = 12
 #: Calls for several frames are compared with calls for single frames.
 #: Maximum number of calls for single frames.
 SINGLE_FRAMES = 2
 TESTED_NAMES = 6
-#: Distance of the far base from the world's origin, in metres.
+#: Standard deviation of each coordinate of the far base's position, in metres.
 FAR = 1e6
 #: Quantities that one call computes for several frames.
 #: The value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.

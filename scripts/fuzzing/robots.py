@@ -16,7 +16,7 @@ from urdfkin.urdf.records import FURTHER_LIMITS
 ODDITIES = ("names", "prefixes", "versions", "mimic", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
-#: Names that resemble internal names of urdfkin or Pinocchio.
+#: Names for random robots: internal names of urdfkin or Pinocchio, and similar names.
 INTERNAL_NAMES = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
@@ -205,7 +205,7 @@ class _RandomRobot:
     def joint(self, i: int) -> str:
         """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Most random robots are chains, because a chain accumulates the largest rounding errors.
+        # About half of the random robots are chains, because a chain accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",

@@ -1,1 +1,1 @@
-"""Parts of scripts/mutate.py: the mutants, their injection into a process, and the selection of tests."""
+"""Parts of scripts/mutate.py: the mutants, and their injection into a process."""

@@ -332,7 +332,8 @@ def find_renamed_files(
     """Find robots whose file was renamed between two reports, and return a mapping from old to new source.
 
     A file was renamed if one source is only in the old report, one source is only in the new report, and both
-    sources have the same robot name. The robot name must occur only once in each of these two groups.
+    sources have the same robot name.
+    In each report, only one source that the other report lacks has this robot name.
     """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {

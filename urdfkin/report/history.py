@@ -130,7 +130,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 class History:
     """Runs and robots of several reports.
 
-    The keys of `robots` are the sources of robots. If a file was renamed, the key is the latest source.
+    The keys of `robots` are the sources of robots. If a file was renamed, the key is its new source.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)
@@ -387,7 +387,7 @@ def _latest_verdicts(history: History, points: Sequence[Point]) -> list[str]:
 
 
 def list_changes(history: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes between runs, each in a pair with the index of its run.
+    """Return all changes between runs, each in a pair with the index of the later run.
 
     The changes of the latest run come first. Within a run, regressions come before other changes.
     """

@@ -196,8 +196,8 @@ def _bound_ratio(check: ReportedCheck, subject: int) -> float:
     """Return an upper limit of the ratio "disagreement / bound" for one subject: a frame, joint or column.
 
     The document has bounds only for the whole check, not for each subject. Therefore, this function divides
-    the subject's largest disagreement by the smallest bound of the check. The ratio of a subject is at most
-    the largest ratio of the check, so the function never returns more.
+    the subject's largest disagreement by the smallest bound of the check. No subject has a larger ratio than
+    the check's `bound_ratio`, so the function reduces a larger quotient to `bound_ratio`.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.

@@ -175,7 +175,7 @@ def configuration_text(sameness: Sameness, frame: Interval) -> str:
     """Return the configuration that gives the lower bound `frame.lower`, as text with units.
 
     The text contains the nonzero coordinates of model A. A joint of model B may have no matching independent
-    joint in model A. The text contains the nonzero coordinate of such a joint too.
+    joint in model A. The text also contains the nonzero coordinate of this joint of B.
     """
     a, b = sameness.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]

@@ -24,7 +24,10 @@ VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
 
 
 def utc(started: str) -> datetime | None:
-    """Return an ISO date and time in UTC, or None for other texts; a time without an offset is in UTC."""
+    """Parse an ISO date and time, and return a `datetime` in UTC; return None for any other text.
+
+    A time without an offset is in UTC.
+    """
     try:
         moment = datetime.fromisoformat(started)
         return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)

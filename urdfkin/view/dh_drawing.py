@@ -90,7 +90,10 @@ class _Canvas:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:
-        """Draw the labels without overlaps; two labels of the same colour at the same point become one."""
+        """Draw the labels; a label that is too close to an earlier label moves sideways.
+
+        Labels of one colour at about the same point are joined: "x_1, x_2".
+        """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for point, along, text, color in self.labels:
             for other, _, texts, other_color in merged:

@@ -41,7 +41,7 @@ FORMATS = ("svg", "png", "pdf")
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of a cross at a number that is wrong or outside its limits.
+#: Colour of crosses: disagreements outside their bound, coordinates outside their limits.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {

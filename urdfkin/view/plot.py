@@ -163,8 +163,8 @@ def _draw_coordinates(
     """Draw the coordinates in `indices` that change during the trajectory.
 
     If no coordinate changes, the panel shows all coordinates in `indices`. If more than
-    `_MOST_NAMES` coordinates are drawn, the coordinates within their limits are grey. Thin horizontal lines
-    show the finite limits of each coloured coordinate. Grey coordinates have no such lines.
+    `_MOST_NAMES` coordinates are drawn, coordinates that are always within their limits are grey. Thin
+    horizontal lines show the finite limits of each coloured coordinate. Grey coordinates have no such lines.
     """
     del x
     values: FloatArray = getattr(trajectory, what)

@@ -89,7 +89,8 @@ class Shape:
         kind: "box", "cylinder", "sphere" or "mesh".
         size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
             For a mesh, the scale factors (x, y, z).
-        colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
+        colour: Red, green, blue and opacity, each from 0 to 1. None: the colours of the mesh file, or
+            `GREY` for an STL file, box, cylinder or sphere.
     """
 
     link: str

@@ -282,7 +282,7 @@ class Stage:
     def _welcome(self, client: Any) -> None:
         """Set the camera of a new page.
 
-        While the page opens, the panel reduces the width of the view. The camera is then set again.
+        Shortly after a page opens, the panel makes the view narrower. The camera is then set again.
         """
         begin, last_aspect = time.monotonic(), 0.0
 
