@@ -76,7 +76,7 @@ INLINE lanes polynomial(lanes z, const double *coefficients, int count) {
     return value;
 }
 
-// Cody and Waite's reduction and fdlibm's polynomials, as in urdfkin/recursion/sine.py, without what that does
+// Cody and Waite's reduction and fdlibm's polynomials, as in urdfkin/compiled/machine/sine.py, without what that does
 // to be right to the last digit.
 INLINE void sine_cosine(lanes x, lanes *sine, lanes *cosine) {
     const double no_fraction = 0x1.8p52, pi_2 = 0x1.921fb54442d18p0;
