@@ -1,4 +1,4 @@
-"""Run a chunk, return a result or the reason of a failure, and save this answer in a file.
+"""Run a chunk, return a result or the reason of a failure, and encode this answer for a file.
 
 If an exception occurs while a robot is validated, the answer contains the exception's message. An answer is
 plain data, because some exceptions cannot be sent between processes.

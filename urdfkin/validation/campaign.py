@@ -75,8 +75,8 @@ def validate(
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
         samples: Number of random configurations within the limits for each robot. `validate` also compares
-            the results for the neutral configuration, the lower limits and the upper limits. Every eighth
-            sample has joint velocities and joint accelerations a hundred times larger.
+            the results for the neutral configuration, the lower limits and the upper limits. Four of
+            25 samples have joint velocities and joint accelerations a hundred times larger.
         seed: Seed of the samples. The same seed gives the same numbers for every `jobs` and `executor`.
         jobs: Number of local processes. If a process crashes, its robot is tried once more, alone in a
             process. Other robots are not affected.
@@ -106,8 +106,8 @@ def validate(
 
     Raises:
         InputError: The number of samples or the seed is negative, or `jobs` is below one. The oracle is not
-            installed. The store contains a validation with other robots or settings, or another process uses
-            the store.
+            installed. The store contains a validation with other robots, settings or versions, or another
+            process uses the store.
         InstallationError: Pinocchio is missing or unsupported, or the installed module `pinocchio` belongs to
             another project.
         SourceError: The folder of the store cannot be created or used.

@@ -1,8 +1,8 @@
 """Chunks of a validation, and their comparison with Pinocchio; a chunk is a range of samples of one robot.
 
-A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
-data. Therefore, a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2
-of a robot are the neutral configuration, the lower limits and the upper limits.
+The robot, the seed, the number of samples and the sample's index determine a sample. Inputs and results of a
+chunk are plain data. Therefore, a chunk can run in this process, in another process or on another machine.
+Samples 0, 1 and 2 of a robot are the neutral configuration, the lower limits and the upper limits.
 
 Each group of 25 random samples has its own seed. Therefore, the size of a chunk does not change any result.
 """

@@ -43,8 +43,7 @@ from urdfkin.verify.oracles import version
 #: Every thread then always has a next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: A high number is safe, because a robot cannot crash a Dask worker.
-#: The worker runs each chunk in a separate process.
+#: A high number is safe: a chunk can crash a child process of a Dask worker, but not the Dask worker.
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
@@ -96,7 +95,8 @@ def _client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Delete the failed client in this thread. If another thread deleted the client, Dask would hang.
+        # Delete the failed client in the thread that created the client.
+        # If another thread deleted the client, Dask would hang.
         gc.collect()
         keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -213,7 +213,7 @@ class Cluster:
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
         #: For each robot, a future of the text that describes the robot. The workers store this text.
         self._robots: dict[int, Future[bytes]] = {}
-        #: Number of chunks without an answer for each robot.
+        #: Number of sent chunks without an answer, for each robot.
         self._in_use = Counter[int]()
         self._limit, self._counted = _MORE, float("-inf")
 
@@ -229,7 +229,7 @@ class Cluster:
                         continue
                     try:
                         completed.add(self._send(task, 1))
-                    except (UrdfkinError, OSError) as error:  # The file of the robot cannot be read.
+                    except (UrdfkinError, OSError) as error:  # The file cannot be read or has changed.
                         failed.add(task.robot)
                         on_answer(task, make_failure(task.chunk.robot_input, error))
                 if not self._pending:

@@ -29,7 +29,7 @@ class CampaignProgress:
     Attributes:
         robots_done: Number of complete or failed robots.
         chunks_done: Number of chunks that are finished or no longer needed.
-        chunks_from_earlier_run: Number of finished chunks from an earlier run.
+        chunks_from_earlier_run: The part of `chunks_done` that comes from an earlier run.
         failures: Number of robots with a disagreement or a failed chunk.
     """
 

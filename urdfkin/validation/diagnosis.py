@@ -2,9 +2,12 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. If the largest difference is now at least a thousand times smaller, the
-module reports the mistake. If no mistake explains the whole result, the module reports mistakes in single
-columns of a Jacobian. At most three mistakes are reported.
+results with the user's results. A mistake explains the whole result if
+
+    max |user's results - changed results| <= max |user's results - urdfkin's results| / 1000.
+
+If no mistake explains the whole result, the module reports mistakes in single columns of a Jacobian. At most
+three mistakes are reported.
 """
 
 from __future__ import annotations

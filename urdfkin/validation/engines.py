@@ -5,8 +5,8 @@ matter: the collector sorts the answers, so no result depends on the engine. If 
 `Failure`, an engine may skip the remaining chunks of the same robot. The engine must run all other chunks.
 Tasks are created only when they are needed, so a million tasks take no memory.
 
-Different workers get chunks of different robots, so that most robots are read by one worker only. If no robot
-is waiting, a free worker takes chunks of the robot with the most remaining chunks.
+`WorkQueue` gives different workers chunks of different robots, so that most robots are read by one worker.
+If no robot is waiting, a free worker takes chunks of the robot whose latest chunk has the lowest index.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ AnswerCallback = Callable[[Task, Answer], None]
 class Engine(Protocol):
     """Interface of an engine.
 
-    If `run` raises an exception, the validation ends. The answers of finished tasks are kept.
+    If `Engine.run` raises an exception, `validate` runs no further task and returns a report. The answers of
+    finished tasks are kept.
     """
 
     def run(self, work: Work, on_answer: AnswerCallback) -> None: ...

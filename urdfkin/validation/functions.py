@@ -103,7 +103,7 @@ class FunctionCheck(Displayable):
         oracle: Name and version of the oracle that confirmed urdfkin's results; "" if no oracle could check
             urdfkin's results.
         samples: Number of configurations.
-        compared: Number of results that have the right shape.
+        compared: Number of results that are real numbers in the right shape, NaN included.
         factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
         bound_ratio: Largest difference from urdfkin's result, as a multiple of the allowed difference
@@ -114,8 +114,8 @@ class FunctionCheck(Displayable):
         columns: The dictionary {name of the joint velocity: `bound_ratio` of the column}. Empty for
             quantities without a column for each joint velocity.
         worst: The worst result; None if no result was compared.
-        errors: Number of configurations with an exception or a wrong shape.
-        first_errors: The first exceptions and wrong shapes, with messages.
+        errors: Number of configurations with an exception, or without real numbers in the right shape.
+        first_errors: The first exceptions and invalid results, with messages.
         diagnoses: Possible mistakes in the function. Each mistake alone explains all results, or one column
             of a Jacobian.
 
@@ -263,10 +263,11 @@ def verify_function(
     """Compare the results of your function with the results of urdfkin and of the oracle.
 
     The allowed difference is a derived bound on rounding errors. The function receives q (nq,) for all
-    quantities, and v (nv,) and a (nv,) for some quantities. The units are rad, m and s. The values are random
-    within the limits; the zero configuration and the joint limits come first. In every eighth sample, v and a
-    are a hundred times larger, so that quadratic terms have a visible effect. An exception or a result of
-    wrong shape does not end the check. The check reports the exceptions and wrong shapes.
+    quantities, and v (nv,) and a (nv,) for some quantities. Without `convention`, the units are rad, m and s.
+    The values are random within the limits; the zero configuration and the joint limits come first. In every
+    eighth sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An
+    exception or a result of wrong shape does not end the check. The check reports the exceptions and wrong
+    shapes.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -281,7 +282,8 @@ def verify_function(
         seed: Seed of the random configurations.
         factor: The allowed difference is the bound on rounding errors times this factor. The bound is derived
             for a recursion from joint to joint; give a factor above 1 for a method with larger rounding
-            errors. `FunctionCheck.smallest_factor` is the smallest factor with which the check passes.
+            errors. `FunctionCheck.smallest_factor` is the smallest factor with which all compared
+            results agree with urdfkin's.
         batch: If True, the function computes n configurations in one call, and returns n results. The shapes
             of the inputs are then (n, nq) for q, and (n, nv) for v and a.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
@@ -550,7 +552,7 @@ class _Run:
     def _call_function(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Call the user's function for a batch of configurations.
+        """Call the user's function once with `batch`, otherwise once for each configuration.
 
         Returns:
             The valid results, and the indices of their configurations.

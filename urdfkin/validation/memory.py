@@ -4,9 +4,10 @@ Frames are compared in blocks, to limit the memory. The largest arrays are the J
 samples * frames * 6 * nv numbers. The report is the same for every size of the blocks, because a frame's
 results do not depend on the other frames.
 
-All processes of a validation together use at most half of the memory that is free at the start. Each process
-gets an equal part of this memory. If a robot needs more memory than one process may use, the robot is not
-verified. The report then states the needed and the allowed memory.
+The `jobs` local processes together use at most half of the memory that is free at the start, in equal parts.
+A process of an executor uses at most half of the memory that is free on its machine. If a robot needs more
+memory than one process may use, the robot is not verified. The report then states the needed and the allowed
+memory.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _FRACTION = 0.5
 #: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for its workspace, and _PER_LINK bytes for each link.
 #: Both constants were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
-#: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
+#: Maximum number of arrays in memory at the same time; each contains the results of a block of frames.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")

@@ -63,12 +63,12 @@ class Program:
         robot: The robot; the program receives the path of a file with the robot's URDF, and the joint names.
         quantity: Name of the quantity.
         frame: Name of the frame.
-        reference: Name of the reference frame; None for a placement.
+        reference: Name of the reference frame; None if the quantity has no reference frame.
         convention: Name of the convention of q, v, a and the result; None for urdfkin's convention.
         timeout: Longest time for an answer, in seconds; at most a day.
 
     Raises:
-        InputError: an empty command, or a timeout that is not positive.
+        InputError: an empty command, or a timeout that is not positive or is above a day.
         SourceError: the program cannot be started.
 
     >>> import urdfkin

@@ -1,6 +1,6 @@
 """Functions that run on the machines of a cluster.
 
-Dask's worker computes nothing. The worker runs each chunk in a separate process, so a robot can crash this
+Dask's worker computes nothing. The worker runs chunks in child processes, so a robot can crash a child
 process, but not the worker. If a chunk crashes the process, the worker runs the chunk again in a new process.
 If the new process crashes too, the robot's result is "not verified"; the reason is the signal or exit status.
 Chunks and answers are transferred as bytes. A chunk does not contain the text of the robot. The text is sent

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that display results, but compute no results. Their code may change during a campaign.
+#: Packages that display results, but compute no results.
+#: A campaign can resume after a change of these packages.
 _DISPLAY = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
@@ -227,14 +228,15 @@ class ValidationReport(Displayable):
 
     @property
     def passed(self) -> bool:
-        """Whether every requested robot was verified; False if no robot was requested."""
+        """Whether every requested robot was verified without interruption; False without a robot."""
         return self.outcome.passed
 
     @property
     def exit_code(self) -> int:
         """Exit code of the command `validate`.
 
-        0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified.
+        0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified
+        or has no report, or there was no robot.
         """
         return self.outcome.exit_code
 

@@ -1,7 +1,7 @@
-"""The robots to validate, as plain data; each robot is identified by the digest of its text.
+"""The robots to validate, as plain data; `origin` and the digest of the text identify a robot.
 
-A robot from a file is represented by the path, so that thousands of robots take little memory. An error is
-raised if the text has changed since the start of the validation.
+A robot from a file is represented by the path, so that thousands of robots take little memory.
+`RobotInput.text` raises InputError if the file has changed since the start of the validation.
 """
 
 from __future__ import annotations

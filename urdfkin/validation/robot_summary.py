@@ -1,7 +1,8 @@
-"""Summary of a robot for `urdfkin info --format json` and the validation report.
+"""Summary of a robot for the validation report.
 
-The summary has the links and joints, the findings in the file, and Denavit-Hartenberg tables. The summary is
-plain data, which can be sent between processes and written as JSON.
+`urdfkin info --format json` prints only the result of `describe`. The summary has the links and joints, the
+findings in the file, Denavit-Hartenberg tables, and a comparison with yourdfpy. The summary is plain data,
+which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
 from the base to the leaves. If several paths have the same moving joints, the summary contains only one path.

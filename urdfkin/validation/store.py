@@ -420,7 +420,7 @@ def _lock(file: IO[bytes], flags: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, flags):
             return
-        time.sleep(0.1)  # To test whether the lock is free, another process may hold the lock for a moment.
+        time.sleep(0.1)  # `Store.writing_process` in another process may hold the lock for a moment.
     raise InputError(
         "another process uses this store",
         where=str(folder),

@@ -65,12 +65,12 @@ LICENCE = "CC0-1.0"
 #: If the limits exclude zero, the joint is at the limit nearest to zero.
 SAMPLES = 3
 #: Random joint velocities and joint accelerations are between -_RANGE and _RANGE.
-#: Random positions of planar and floating joints are in the same interval.
+#: Random q of planar and floating joints, except quaternions, are also between -_RANGE and _RANGE.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: Multiples of 1 / 1024 have at most ten decimals. A double represents them without rounding.
 _GRID = 1024.0
-#: A tolerance is first rounded to 12 significant digits.
+#: The tolerance k * eps * scale is first rounded to 12 significant digits.
 #: Then the tolerance is rounded upward to 3 significant digits.
 #: The rounding to 12 digits removes the last digits, which differ between processors.
 _DIGITS, _FIRST_DIGITS = 3, 12

@@ -202,7 +202,7 @@ class _WorkerPool:
                     self._workers.append(worker)
             except Exception as error:
                 if self._workers:
-                    # Another worker process runs the task later.
+                    # A worker process that already runs takes the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._enter_answer(task, make_lost_failure("no process could be started", error))
