@@ -207,7 +207,7 @@ def validate_command(
     whenever a command computes the quantity.
 
     Configurations are random within the joint limits. The command adds the neutral configuration, and the
-    configurations in which all joints are at their lower or upper limits. In every eighth sample, joint
+    configurations in which all joints are at their lower or upper limits. In 4 of 25 samples, joint
     velocities and accelerations are a hundred times larger than in the others.
 
     Disagreements are in multiples of eps * scale. Here eps is 2.2e-16, and scale is the size of the terms
