@@ -1,6 +1,7 @@
 """Command-line interface; the module of a command is imported only when the command runs.
 
-The summaries of all commands are in this module, so that `urdfkin --help` needs neither NumPy nor Pinocchio.
+The summaries of commands are in this module or in `verify/quantities.py`. Therefore, `urdfkin --help` needs
+neither NumPy nor Pinocchio.
 """
 
 from __future__ import annotations

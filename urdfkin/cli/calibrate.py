@@ -145,7 +145,7 @@ def calibrate_command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # The JSON function returns a text, because `Answer` would add an entry `check` to a mapping.
+        # JSON is returned as text: `Answer` would add the entries `verified` and `check` to a mapping.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 

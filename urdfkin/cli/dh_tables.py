@@ -67,7 +67,7 @@ class DHRequest:
     """The values of the options of `urdfkin dh`.
 
     `choices` contains the values that are passed to `Robot.dh` as keyword arguments. `unchanged` is the table
-    file if ROBOT is a table file and no option changes the rows. Otherwise, `unchanged` is None.
+    file ROBOT if no option in `urdfkin.cli.dh._DERIVING` is given. Otherwise, `unchanged` is None.
     """
 
     robot: Robot

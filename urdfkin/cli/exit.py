@@ -1,8 +1,8 @@
 """Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
 SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-disagreement. Python exits with 1 after an uncaught exception, so urdfkin catches unexpected exceptions and
-exits with 70.
+negative result, such as a disagreement, and never a crash. Python exits with 1 after an uncaught exception,
+so urdfkin catches unexpected exceptions and exits with 70.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ _INTERRUPTED_EXIT_CODE = 128 + signal.SIGINT
 def run(command: click.Command, name: str) -> int:
     """Run a command and return its exit code.
 
-    0: success. 1: a disagreement. 2: bad input or usage. 3: computed, but not checked by Pinocchio. 70: a
-    defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
+    0: success. 1: a negative result, such as a disagreement. 2: bad input or usage. 3: not checked by
+    Pinocchio, refused or incomplete. 70: a defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
         # In standalone mode, click would exit with 1 after an interrupt.

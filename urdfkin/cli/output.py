@@ -62,8 +62,8 @@ class Answer:
     Attributes:
         document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
-            array for npy, or the output as text. `data` may also have a function for a format in
-            `TEXT_FORMATS`. For such a format, the function in `data` replaces `document`.
+            array for npy, or the output as text. For a format in `TEXT_FORMATS`, `data` may have a function
+            that replaces `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
         fit_document: Function that returns a document that fits the width of a terminal. None: use
             `document`.
@@ -187,7 +187,10 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Raise SourceError before a long computation if an output file cannot be written."""
+    """Raise SourceError before a long computation if no file can be made in the folder of an output file.
+
+    A read-only output file is an error only in `write_file`.
+    """
     for path in filter(None, paths):
         try:
             # `write_file` writes to a device or a pipe directly, without a temporary file.

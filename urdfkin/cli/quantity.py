@@ -1,6 +1,6 @@
 """Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `urdfkin placement`.
 
-Each quantity of `verify/quantities.py` has a command.
+`make_command` makes the command of a quantity in `verify/quantities.py`.
 """
 
 from __future__ import annotations
@@ -255,7 +255,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Headings of the first column of CSV output.
+#: Possible headings of the first column of CSV output.
 #: The heading is "t" if the samples have times, otherwise "sample".
 _TIME = ("sample", "t")
 

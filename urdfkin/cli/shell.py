@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Maximum size (bytes) of a file from which shell completion reads frame names
 _MOST_BYTES = 10_000_000
-#: XML elements that define frames. In a URDF, only children of the root element define frames.
+#: XML elements that define frames. In a URDF, only elements directly below <robot> define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 

@@ -93,8 +93,8 @@ def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
     Reading from standard input and writing to standard output must fail, as on a closed stream. Therefore,
-    the null device is opened only for writing as standard input, and only for reading as standard output.
-    Text for standard error is lost.
+    standard input is opened only for writing, and standard output only for reading. Text for standard error
+    is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:

@@ -108,7 +108,7 @@ class UrdfkinError(Exception):
     Attributes:
         what: The problem in one clause, without a full stop.
         where: Place of the problem: a line of a file, a frame, or a sample; None: unknown.
-        found: The wrong value, as the user wrote it.
+        found: The wrong value, or a description of it, such as "shape (1,)".
         remedy: Instruction for the user.
         question: Section of docs/questions.md; the message ends with the command that prints the section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.

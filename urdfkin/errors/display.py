@@ -154,14 +154,17 @@ class Strong(str):
 
 
 class CodeLine(str):
-    """A line that is printed as code, for example a formula."""
+    """A line that Markdown displays as code, for example a formula."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """A title with sentences, tables and matrices; an empty string in `parts` becomes a blank line."""
+    """A title with sentences, tables and matrices.
+
+    `text` prints a blank line for an empty string in `parts`. The other formats leave out empty strings.
+    """
 
     title: str
     parts: Sequence[str | Table | Matrix] = ()

@@ -149,10 +149,9 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the JSON path and a description of the first unknown entry in `data`, or None.
+    """Find an entry of `data` that is missing in `document`, the result of the conversion of `data`.
 
-    `document` is the result of the conversion of `data`. An entry of `data` is unknown if the entry is
-    missing in `document`.
+    Return the JSON path of the mapping that contains the entry, and a message. None: no entry is missing.
     """
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:

@@ -1,6 +1,6 @@
 """Read and write files safely, and replace parts of a text.
 
-By default, the functions accept only regular files. An untrusted folder may contain a link to an endless
+By default, the functions read only regular files. An untrusted folder may contain a link to an endless
 device, or a named pipe without a writer. A path from the user may be a pipe, such as `<(xacro arm.xacro)` in
 bash. A pipe is read with a timeout; Python's `open` would wait for ever.
 """

@@ -19,7 +19,7 @@ def make_fork_safe_lock() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
     A fork waits until the lock is free. A fork acquires the newest lock first and the oldest lock last.
-    A thread that needs two locks must acquire the newer lock before the older lock, as a fork does.
+    A thread that needs two locks must acquire first the lock that was made last, as a fork does.
     The opposite order can cause a deadlock.
 
     Use this function only for module variables, because this module stores each lock until the process ends.
@@ -38,13 +38,13 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # Another thread can register `_before_fork` during a fork. In this case, `_acquired` has no entry.
+    # If another thread registered `_before_fork` during this fork, `_acquired` has no entry for this thread.
     for lock in reversed(_acquired.pop(threading.get_ident(), [])):
         lock.release()
 
 
 class ImportLock:
-    """The lock that a thread holds during a lazy import.
+    """Lock of urdfkin, not of Python, for imports inside functions, such as those of `lazy_import`.
 
     Without this lock, another thread could fork a child process during the import. The child process would
     then wait for ever for the end of the import.
@@ -60,7 +60,7 @@ class ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        # A module may call `register` while another thread imports that module.
+        # This return avoids a deadlock: the holder of the lock may wait for the import of the calling module.
         if self._registered:
             return
         with self._lock:

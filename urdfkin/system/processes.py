@@ -34,7 +34,7 @@ def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 
 def _import_path() -> list[str]:
-    # Empty and relative entries of `sys.path` refer to the current folder.
+    # Empty and relative entries of `sys.path` depend on the current folder.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)), home]
 
