@@ -15,8 +15,8 @@ nearly parallel axes.
 
 For parallel axes, the tip's pose determines only the sum of the offsets d. For coinciding axes, the tip's
 pose determines only the sum of the angles theta. `match_axis_transforms` copies d and theta of such axes from
-a reference table, except for one row. In this row, d or theta is computed so that the sum agrees with the
-path. In a Hayati row, any d is possible, because the axes do not determine d.
+a reference table, except for one row. The d or theta of this row makes the sum agree with the path. In a
+Hayati row, any d is possible, because the axes do not determine d.
 """
 
 from __future__ import annotations
@@ -301,8 +301,7 @@ def _choose_offset(
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for d.
-        # One of the rows i to end - 1 may be a Hayati row.
-        # Then d is chosen so that the Hayati row and the reference table have the same cell a.
+        # If a row from i to end - 1 is a Hayati row, d gives this row the reference's cell a.
         end = max(range(i, end), key=lambda k: tilt_sine(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

@@ -259,8 +259,8 @@ def _find_transforms(
     options: DerivationOptions,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", each row contains the offset of its own link here.
-    # Later, `_sum_offsets_in_first_row` moves the sum of the offsets to the first row of parallel axes.
+    # For "first" and "each", row i contains the offset from axis i to a parallel axis i + 1.
+    # For "first", `_sum_offsets_in_first_row` later moves the sum to the first row of parallel axes.
     each = options.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):

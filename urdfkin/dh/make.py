@@ -22,7 +22,8 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.tree import KinematicTree
 
-#: If the cells of two tables differ by more than this number, the tables describe different robots.
+#: If alpha, a or d differ by more than this number, two tables describe different robots.
+#: Cells are ignored if base, tool or a prismatic axis can compensate for their difference.
 #: Angles are in rad, and lengths are relative to the reach.
 _MAX_DIFFERENCE = 0.1
 #: Two angles theta (rad), or two entries of rotation matrices, count as equal up to this difference.

@@ -77,8 +77,8 @@ def find_table_in_text(text: str) -> dict[str, Any]:
             break
     else:
         raise _missing_header_error(lines)
-    # For a robot with the name "robot", the table's title begins with "robot:".
-    # Without this line, such a title would be read as a setting, for example "robot: ur5".
+    # The title of a robot with the name "robot" begins with "robot:", as the setting "robot: ur5" does.
+    # Therefore, titles are removed before the settings are read.
     without_title = [line for line in grid.other_lines if not _TITLE.search(line)]
     data = _parse_settings(without_title, _CSV_SETTING if form is _parse_separated else _SETTING)
     if "convention" not in data and (convention := _find_convention(grid)):

@@ -41,9 +41,10 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, free
 #: Above 7.5 degrees, an angle could become either of two multiples of 15 degrees.
 MAX_SNAP_TOLERANCE = math.pi / 36.0
 SNAP_SAMPLES = 500
-#: Assumed range (rad or metres) of a mimicked joint that is not on the path.
+#: Samples of a mimicked joint that is not on the path are in this range (rad or metres).
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: `find_noisy_cells` returns cells with a deviation up to this number (rad, or relative to the table's span).
+#: `find_noisy_cells` ignores angles farther than this number (rad) from a multiple of 15 degrees.
+#: The function also ignores lengths above this number times the table's span.
 _MAX_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 

@@ -158,8 +158,7 @@ class DHRow:
         return joint_transform(self.theta, self.d)
 
 
-#: An angle in a table is treated as a rounded multiple of 15 degrees up to this deviation.
-#: The deviation is a fraction of 15 degrees.
+#: An angle looks round if |angle - nonzero multiple of 15 degrees| <= this number * 15 degrees.
 _ROUND_TOLERANCE = 1e-3
 #: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _RIGID_TOLERANCE = 1e-6
@@ -323,7 +322,7 @@ class SnapReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table of a path; `urdfkin.load` makes a robot from it.
+    """A Denavit-Hartenberg table of a path; `urdfkin.load(table)` returns a robot.
 
     Attributes:
         convention: Standard or modified.
@@ -477,7 +476,7 @@ class DHTable(Displayable):
     def unlimited(self) -> tuple[str, ...]:
         """Names of the prismatic joints without limits.
 
-        Bounds assume that these joints travel at most 10 m.
+        Bounds assume that these joints stay within 10 m of zero.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited

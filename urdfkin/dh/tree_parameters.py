@@ -234,7 +234,7 @@ def _find_transforms(
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
-        # The first moving child of a link defines the link's x axis.
+        # The first moving link with antecedent i defines x_i.
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))

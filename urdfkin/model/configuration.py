@@ -46,9 +46,9 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest absolute value (rad or m) of a random joint value.
-#: A random value of a revolute or prismatic joint without limits is between -10 and 10 (rad or m).
-#: A random value of a continuous joint is between -pi and pi.
+#: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
+#: For a revolute or prismatic joint without limits, `sample` draws from -10 to 10 (rad or m).
+#: For a continuous joint, `sample` draws from -pi to pi.
 #: Some upper bounds hold only if certain joints travel at most this distance (m) from zero.
 #: These are planar joints, floating joints, and prismatic joints without limits.
 #: Few linear axes of robots are longer than 10 m.
@@ -171,7 +171,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     # Rounding errors narrow the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
+    if not math.isfinite(error):  # With only one limit, `size` and `error` are infinite.
         error = (
             MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
         )

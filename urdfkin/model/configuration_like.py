@@ -28,7 +28,7 @@ from urdfkin.errors.numbers import number_remedy, parse_float, parse_quantity
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, as_floats
 
-#: Types that q, v and a may have. `ArrayLike` contains `str`, so q, v and a may also be text.
+#: Types that q, v and a may have. `ArrayLike` contains `str`, for text such as "ready".
 ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 
 _MAX_NAMES = 8

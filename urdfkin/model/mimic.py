@@ -1,4 +1,4 @@
-"""The linear map from a path's coordinates to the values of all joints on the path, including mimic joints.
+"""The map from a path's coordinates q to the values G q + g of its joints, including mimic joints.
 
 The coordinates of a path are its independent joints, in path order. A mimic joint has no coordinate: its
 value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path

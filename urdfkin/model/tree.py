@@ -110,7 +110,7 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
+#: Largest plausible |joint angle| (rad): some industrial wrists turn 400 degrees in each direction.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A joint value is far outside the limits if both of the following conditions hold.
 #: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).

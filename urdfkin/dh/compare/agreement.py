@@ -45,13 +45,12 @@ _FIT_SEED, _CHECK_SEED = 1, 2
 #: The remaining tip error must be at most this fraction of the tip error without the correction.
 #: A remaining tip error of at most `NEGLIGIBLE_ERROR` times the reach is accepted in every case.
 _CORRECTED_FRACTION = 0.5
-#: If a table does not agree with the URDF, the search for a mistake in the table uses this number.
-#: The search accepts a correction that reduces the tip error to at most this fraction.
-#: The search also accepts a correction with a remaining tip error within the tolerance.
+#: If a table does not agree with the URDF, urdfkin searches for a mistake in the table.
+#: Accepted after the correction: tip error <= max(tolerance, this number * tip error before)
 _CORRECTED_MISTAKE_FRACTION = 0.05
 _MIN_CHANGE = 1e-10
-#: Suppose that n cells differ without a fit, and m cells differ after a fit.
-#: The n cells are reported only if n - m is at most this number.
+#: The cells that differ without a fit are reported only if their number is at most
+#: this number + the number of cells that are reported after a fit.
 _MAX_MORE_CELLS = 2
 #: The reach is computed from the positions of the tip.
 #: If the tip moves at most this fraction of the path length, the path length replaces the reach.

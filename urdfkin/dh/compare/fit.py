@@ -41,7 +41,7 @@ _MOTIONS = {
 }
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
-#: Maximum change of a parameter in one step of the fit (rad, or a fraction of the reach).
+#: Maximum change of a free parameter in one step of the fit (rad, or a fraction of the reach).
 _MAX_STEP = 0.5
 _MAX_STEPS = 40
 _MIN_DECREASE = 1e-9
@@ -60,13 +60,14 @@ _LAST_WEIGHT = 1.2
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT_TOLERANCE = 1e-6
 _PATIENCE = 4
-#: The fit tries large changes of joint offsets only if the mean error exceeds this fraction of the reach.
+#: The fit tries large changes of joint offsets only if: root mean square error > this number * reach
 _ROUNDING = 1e-13
 #: The fit tries no further joint signs if the tip error is at most this fraction of the reach.
 _TIP_ROUNDING = 1e-12
-#: Other joint signs are accepted only if they reduce the smallest tip error so far below this fraction.
+#: Other joint signs are accepted if: tip error < this number * smallest tip error of earlier joint signs
 _OTHER_START_ERROR = 0.5
-#: Angles (rad) by which the offsets of two consecutive joints change in opposite directions.
+#: Large changes (rad) of two consecutive joint offsets: theta_i += angle, theta_{i+1} -= angle
+#: If alpha is nearer to pi than to 0, theta_{i+1} += angle.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 #: A fast fit calls `find_sign_fits` with these values of `count` and `beam_width`.
 FAST_SEARCH = (3, 16)

@@ -38,7 +38,7 @@ _PARALLEL_TILT = 2e-2
 #: D: sum of |shape of the table - shape of the URDF|
 #: The minimum is over all interpretations.
 _DIFFERENCE_COST = 0.1
-#: `find_better_interpretation` accepts every interpretation with a tip error within the tolerance.
+#: A tip error within the tolerance is accepted, and ends the search for a better interpretation.
 #: Above the tolerance, the tip error must be at most this fraction of the reach,
 #: and at most this fraction of the tip error of the interpretation that the file states.
 _BETTER_FRACTION = 0.05

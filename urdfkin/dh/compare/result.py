@@ -145,8 +145,7 @@ class TableComparison:
         unfitted_differences: Cells that must change so that the unfitted table agrees.
             Empty if `is_fitted` is false, or if `mistakes` is not empty.
             Empty if a tip error remains, or if more than len(differences) + 2 cells must change.
-        hidden: Row index and name of each hidden cell.
-            A fit compensates errors of hidden cells.
+        hidden: Row index and name of each cell whose error a fit compensates.
         residual: Tip error after cell corrections, m.
     """
 

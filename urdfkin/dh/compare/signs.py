@@ -214,7 +214,7 @@ def _possible_transforms(
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _COINCIDENT_DISTANCE or not both_revolute:
             shifted[:2, 3] = 0.0
         # For a tilt above `NEARLY_PARALLEL`, only a distant common normal gives a Hayati row.
-        # With reach 0, a common normal is distant if it misses one of the two origins.
+        # With reach 0, every common normal is distant, except a normal through both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = find_axis_transform(shifted, hayati_reach, default_phi, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _TEXT = "urdfkin.dh.export.text"
 #: For each format NAME: the module that contains the function `write_NAME`, and a description.
-#: The module name is "" if a module of the package `urdfkin.export` contains this function.
+#: The module name is "" if the package `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),
     "markdown": (_TEXT, "a Markdown table"),

@@ -273,7 +273,7 @@ _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 #: An encoded number is a sequence of characters of `_DIGITS`.
 #: The value of a character is its index in `_DIGITS`, from 0 to 61.
 #: The last character of a number has a value below `_THRESHOLD`.
-#: All other characters of the number have values of at least `_THRESHOLD`.
+#: For all other characters, the index in `_DIGITS` is at least `_THRESHOLD`.
 _THRESHOLD = 31
 
 

@@ -328,7 +328,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
-        # If a branch has no joint after this axis, the axes of other branches determine the pose of B's root.
+        # If no joint follows this axis, the first axes of other branches determine the pose of B's root.
         # For example, each rotor of a drone has a branch of its own with a single joint.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):

@@ -61,7 +61,8 @@ MOST_DEPTH = 200
 #: If several choices at a joint are equally good, the joints after this joint decide.
 #: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
-#: Maximum number of poses of B's root that the search for an exact match tries.
+#: Maximum number of poses of B's root from axes that the search for an exact match tries.
+#: The number applies to each pair of first bodies.
 MOST_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
 #: For equal numbers, a score with a much smaller difference (m) is better.
@@ -833,7 +834,7 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # The rules of each joint pair require y = alpha x + beta.
+        # Rules of a joint pair: y = alpha x + beta, with the coordinates x of A and y of B.
         # Only the joint pairs with the most frequent alpha get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0

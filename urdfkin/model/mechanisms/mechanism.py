@@ -1,10 +1,10 @@
 """Describe a robot by its rigid bodies and joint screws in the zero configuration, and align two such robots.
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-link's pose H describe the zero configuration, in one common frame. The links between the joints do not occur
-in this product. If links that are fixed to each other are merged or split, the product stays the same. Any
-body may be the root. The path from the root may cross a joint from the child link to the parent link. In this
-case, the joint's screw is reversed.
+link's pose H describe the zero configuration, in one common frame. The poses of the links between the joints
+are not factors of this product. If links that are fixed to each other are merged or split, the product stays
+the same. Any body may be the root. From such a root, the path may lead from the child link of a joint to the
+parent link. In this case, the joint's screw is reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
 different frames for the joint. The constant rigid motion M describes this difference. A and B may also define
@@ -21,10 +21,10 @@ over, N must also turn the plane over.
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
 the value t moves the bodies after it by exp(S t). The matched joint of B moves the corresponding bodies by
-exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If G moves A's
-joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and all later
-bodies of B are displaced together, G changes at the joint by a constant rigid motion L. If only the axis is
-displaced, S' differs from S. The link poses of A and B are then
+exp(S' t'). S' and t' use the positive direction and the zero of A's joint. If G moves A's joint axis to B's
+joint axis, the bodies before and after the joint have the same G. If the axis and all later bodies of B are
+displaced together, G changes at the joint by a constant rigid motion L. If only the axis is displaced, S'
+differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
@@ -35,9 +35,9 @@ exceptions. For example, two consecutive revolute joints with the same line as a
 the sum of the two angles.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
-is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
-determine this function. Some coordinates of B are additional variables. For example, if A's joint is fixed
-and B's joint moves, the coordinate of B's joint is an additional variable.
+is a variable. A coordinate of B is slope * variable + constant. The sign and the zero offset of the joint
+determine the slope and the constant. Some coordinates of B are additional variables. For example, if A's
+joint is fixed and B's joint moves, the coordinate of B's joint is an additional variable.
 """
 
 from __future__ import annotations
@@ -736,10 +736,9 @@ class MatchedValues:
     #: Value in the positive direction and zero of B's own joint: b_unconverted = sense * b + offset.
     b_unconverted: LinearFunction
     #: If the computed functions of A and B differ by rounding only, `b` is set equal to `a`.
-    #: `rounding` (rad or m) is then max(0, D - E).
+    #: `rounding` (rad or m) is then max(0, D - E). Otherwise, `rounding` is 0.
     #: D is the absolute difference between the constants of the two computed functions.
     #: E is the rounding error of one joint.
-    #: If the functions differ by more than rounding, `rounding` is 0.
     rounding: float = 0.0
 
     @property
