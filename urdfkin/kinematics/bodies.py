@@ -299,7 +299,7 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 in x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C has several right inverses.
+    For a quaternion, C (6, 7) has several right inverses C^-1: C C^-1 = I.
     The returned inverse gives rates perpendicular to the quaternion.
     """
     if representation == QUATERNION:

@@ -22,8 +22,8 @@ The dots stand for any batch shape; results have the batch shape of the argument
 | axis, quaternion | a length other than 1 |
 | `frame` | an unknown name |
 
-A user's matrix often has only a few digits. A conversion to a quaternion, a conversion to Euler angles, and
-Gram-Schmidt then give different rotations. `nearest_rotation` and `polar_factor` return the rotation that is
+A user's matrix often has only a few digits. Quaternions, Euler angles and Gram-Schmidt give different
+rotations for the same rounded matrix. `nearest_rotation` and `polar_factor` return the rotation that is
 nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors; `polar_factor` accepts
 errors of any size. The nearest rotation is unique, and is the orthogonal factor U of the polar decomposition
 M = U H.
@@ -388,7 +388,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of components below 1e-150 may lose digits. For such a vector, the result is 2 times `vector`.
+    # Squares of components below 1e-150 may lose digits. If |vector| < 1e-150, the result is 2 * vector.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 

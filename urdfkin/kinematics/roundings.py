@@ -302,14 +302,14 @@ FILE_ROUNDINGS = 45.0
 #: Rounding error of a length along a joint axis.
 #: The unit of the error is eps times the length of the path.
 #: A dot product has an error of 2.4 eps, and a sum of lengths has an error of 0.5 eps times the sum.
-#: Only a few of these sums are nearly as large as the length of the path.
+#: Few sums of lengths are nearly as large as the length of the path.
 LENGTH_ROUNDINGS = 4.0
 
 # Numbers within these tolerances are replaced by round numbers.
 
 #: Rounding error (in eps rad) of an angle between -pi and pi.
 #: A computed multiple of pi/12 has an error of 1.2, and a value of arctan2 has an error of 1.1.
-#: A number in a file has an error of 1.0.
+#: An angle in a file, rounded to a double, has an error of 1.0.
 ANGLE_ROUNDINGS = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #:
@@ -333,7 +333,8 @@ ROTATION_ROUNDINGS = 8.0
 #: The mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
 #: The sum of the four errors is 2.0.
-#: `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the converted range are accepted.
+#: urdfkin narrows the range of the mimicked joint at each end by twice this sum.
+#: The mimic joint's limits then accept both ends.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 

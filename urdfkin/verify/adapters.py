@@ -1,8 +1,8 @@
 """Read a robot file with other libraries, with one adapter for each library.
 
-This module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
-`scripts/make_libraries.py` runs this module as a program, with the Python interpreter of a virtual
-environment in which one library is installed:
+Besides the standard library, this module imports only NumPy and the chosen library. The command `urdfkin
+readers` imports this module. `scripts/make_libraries.py` runs this module as a program, with the Python
+interpreter of a virtual environment in which one library is installed:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
@@ -11,9 +11,9 @@ case. A configuration maps the name of each independent joint to the joint's val
 prismatic joint is one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The
 value of a floating joint is seven numbers (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
-joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the
-adapter does not correct them.
+An adapter passes all inputs that the library's documentation requires. An adapter gives the library only the
+values of independent joints. The library can read the mimic rules in the file. If the library computes wrong
+poses, the adapter does not correct them.
 """
 
 from __future__ import annotations

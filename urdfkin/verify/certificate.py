@@ -145,7 +145,7 @@ class Certificate(Displayable):
     Attributes:
         robot: The robot's name.
         oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
-        lines: One line for each computed quantity.
+        lines: One line for each quantity with results, checked or not.
         not_verified: Reasons why results were not checked; empty if every result was checked.
         source_notes: Text about the checked conversion of another format to URDF, and about locked joints.
             For a URDF without locked joints, the text is empty.

@@ -175,7 +175,7 @@ def coupling(full, columns, index, factor, out):
 
 _TURN, _SLIDE = int(JointMotion.REVOLUTE), int(JointMotion.PRISMATIC)
 #: Number of bounds (p, w, vel, alpha, acc) per link.
-#: `free` contains five lengths for each planar or floating joint.
+#: `free` contains displacement, o, u, o_rate and u_rate of each planar or floating joint.
 _STATE_SIZE = _FREE_SIZE = 5
 
 

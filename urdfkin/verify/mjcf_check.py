@@ -3,8 +3,8 @@
 Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
 from the MJCF file to the tree. `load` therefore makes three comparisons:
 
-- MuJoCo compiles the file and computes the placements of bodies and sites. The tree must have the same
-  placements.
+- MuJoCo compiles the file and computes the placements of bodies and sites. These placements must agree with
+  the tree's placements.
 - The joint equalities of MuJoCo's model must agree with the tree's mimic rules.
 - Pinocchio's MJCF reader computes the placements of bodies. Pinocchio reads some files differently, so a
   difference from Pinocchio is reported, but is not an error.

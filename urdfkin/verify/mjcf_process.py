@@ -117,7 +117,7 @@ def compute_answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             read = whole
         except (MemoryError, InputError, import_mujoco().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
-                raise  # MuJoCo compiles the file, but the result is not a tree.
+                raise  # MuJoCo compiles the file, but urdfkin does not support the model.
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"shapes_refusal": _add_memory_hint(found) or _MEMORY_HINT}
     if samples and path is not None:
@@ -199,7 +199,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # A revolute joint without limits has two coordinates: the cosine and sine of its angle.
+            else:  # In Pinocchio, a revolute joint without limits has two coordinates: cosine and sine.
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]

@@ -4,8 +4,8 @@ MuJoCo reads the origins and axes of joints from the URDF text with its own pars
 Pinocchio, MuJoCo computes with unit quaternions, and MuJoCo's six-vectors refer to a centre of mass. This
 module changes the text before MuJoCo reads it:
 
-- Each link becomes a body. Meshes and inertials are removed, and only the root has a mass. The centre of
-  mass, to which MuJoCo's results refer, is therefore the root's origin.
+- Each link becomes a body. Meshes and inertials are removed. In the compiled model, only the root has a mass.
+  The centre of mass, to which MuJoCo's results refer, is therefore the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
@@ -267,7 +267,7 @@ class MujocoOracle(Oracle):
     ) -> FloatArray:
         """Return the placements of all frames.
 
-        MuJoCo receives the first `count` of the inputs q, v and a.
+        MuJoCo receives q (count = 1), q and v (2), or q, v and a (3).
         For each sample k and frame f, this method calls `read(body, (k, f))`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data

@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import (
 )
 
 #: urdfkin requires these versions of Pinocchio.
-#: Tests confirm the definitions of accelerations and J-dot only for these versions.
+#: Tests confirm the definitions of accelerations and J-dot only for Pinocchio 4.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -190,7 +190,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
         # `urdfkin check` finds all known causes of this error before Pinocchio reads the text.
-        # The cause of this error is therefore unknown.
+        # An error from Pinocchio at this point therefore has an unknown cause.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,

@@ -31,7 +31,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 
 #: The search finds minimal sets of at most `_MAX_SET_SIZE` linearly dependent columns.
 _MAX_SET_SIZE = 4
-#: The search is skipped for a Jacobian with more than `_MAX_COLUMNS` columns.
+#: With more than `_MAX_COLUMNS` columns, `_find_dependent_sets` finds no sets.
 _MAX_COLUMNS = 16
 #: error of a singular value <= 16 * (rows + columns) * eps * (Frobenius norm)
 _ROUNDINGS = 16.0
@@ -280,7 +280,7 @@ class _Explanation:
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
         # Three dependent lines that are parallel or concurrent are coplanar.
-        # Four such lines need not lie in one plane.
+        # Four dependent lines that are parallel or concurrent need not be coplanar.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.

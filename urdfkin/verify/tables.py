@@ -1,8 +1,8 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of the tip.
 
-Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The base
-may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
-motion of base b and of tip t in the world, and r = p_t - p_b:
+Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The table's
+base may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be
+the motion of base b and of tip t in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)

@@ -6,9 +6,9 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 - OpenUSD's parser UsdPhysics reads the joints. UsdPhysics and urdfkin's parser must find the same bodies,
   frames, degrees of freedom and limits for each joint. A difference raises OracleError.
 - OpenUSD's module UsdGeom computes the transforms of the prims (scene objects). The stage shows the robot in
-  one configuration. In this configuration, each link must have the placement of the link's prim. The file
-  states the prims' transforms separately from the joint frames. A difference means that the joint frames
-  contradict the prims' transforms; `load` reports the difference as a warning.
+  one configuration. In the stage's configuration, each link must have its prim's placement. The file states
+  the prims' transforms separately from the joint frames. A difference means that the joint frames contradict
+  the prims' transforms; `load` reports the difference as a warning.
 
 A stage stores numbers in single precision. Both comparisons allow only differences that rounding to single
 precision can cause.
@@ -41,8 +41,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 TIMEOUT = 60.0
-#: The joint frames of OpenUSD's parser and of urdfkin may differ by an angle (rad).
-#: The angle is at most `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
+#: Tolerance for the angle between OpenUSD's and urdfkin's frame of a joint:
+#: angle (rad) <= `_ROTATION_ROUNDINGS * SINGLE_ROUNDOFF`; `_check_joint` derives this bound.
 _ROTATION_ROUNDINGS = 18.0
 #: Number of rounding errors in a joint's origin; `_check_joint` derives this number.
 _ORIGIN_ROUNDINGS = 3.0

@@ -46,7 +46,7 @@ _SIGNIFICANT_DIGITS = 17
 #: Number of digits of intermediate results in `format_decimal`.
 #: `format_decimal` then rounds the decimal to 17 digits.
 _CONVERSION_DIGITS = 200
-#: Number of additional bits in Newton's iteration.
+#: Additional bits of precision for the Newton steps of `nearest_rotation`.
 _NEWTON_BITS = 30
 
 _precision_lock = make_fork_safe_lock()
