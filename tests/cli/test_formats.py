@@ -209,6 +209,7 @@ def test_a_file_is_written_through_a_link_and_a_check_for_write_access_leaves_no
     (tmp_path / "there").mkdir()
     link = tmp_path / "link.json"
     link.symlink_to(tmp_path / "there" / "out.json")
+    check_writable(link)
     write_file(link, b"data")
     assert link.is_symlink()
     assert [path.name for path in (tmp_path / "there").iterdir()] == ["out.json"]

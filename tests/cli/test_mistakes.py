@@ -11,6 +11,8 @@ import pytest
 from tests.cli.running import process, refused
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import chain
+from urdfkin.cli.output import check_writable
+from urdfkin.errors import SourceError
 
 ZEROS = "0,0,0,-1,0,0,0,0"
 
@@ -171,6 +173,18 @@ def test_a_read_only_output_file_is_not_replaced(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(os, "access", lambda _, mode: mode != os.W_OK)
     assert "Permission denied" in refused("jacobian ur5 -o", str(path))
     assert path.read_text() == "mine"
+
+
+def test_a_read_only_output_file_is_found_before_the_computation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, link = tmp_path / "J.csv", tmp_path / "link.csv"
+    path.write_text("mine")
+    link.symlink_to(path)
+    monkeypatch.setattr(os, "access", lambda _, mode: mode != os.W_OK)
+    for given in (path, link):
+        with pytest.raises(SourceError, match="J.csv|link.csv: cannot be written: found Permission denied"):
+            check_writable(given)
 
 
 @pytest.mark.slow

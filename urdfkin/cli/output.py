@@ -24,7 +24,7 @@ from urdfkin.errors import SourceError
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_text, json_text
 from urdfkin.errors.numbers import parse_int
-from urdfkin.system.files import write_file
+from urdfkin.system.files import refuse_read_only, write_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -187,16 +187,18 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Raise SourceError before a long computation if no file can be made in the folder of an output file.
+    """Raise SourceError before a long computation if `write_file` cannot write an output file.
 
-    A read-only output file is an error only in `write_file`.
+    A full disk is found only by `write_file`.
     """
     for path in filter(None, paths):
         try:
             # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
                 continue
-            with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
+            target = path.resolve()
+            refuse_read_only(target)
+            with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}."):
                 pass
         except OSError as error:
             found = error.strerror or str(error)

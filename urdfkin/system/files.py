@@ -234,9 +234,7 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        # `Path.replace` would also replace a read-only file.
-        if path.exists() and not os.access(path, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        refuse_read_only(path)
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
         import tempfile
 
@@ -249,6 +247,12 @@ def write_file(path: Path, data: bytes) -> None:
         if name:
             Path(name).unlink(missing_ok=True)
         raise SourceError("cannot be written", where=str(path), found=error.strerror or str(error)) from error
+
+
+def refuse_read_only(path: Path) -> None:
+    """Raise PermissionError for an existing read-only file, which `Path.replace` would replace."""
+    if path.exists() and not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def _umask() -> int:
