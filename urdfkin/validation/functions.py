@@ -116,8 +116,8 @@ class FunctionCheck(Displayable):
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception, or without real numbers in the right shape.
         first_errors: The first exceptions and invalid results, with messages.
-        diagnoses: Possible mistakes in the function. Each mistake alone explains all results, or one column
-            of a Jacobian.
+        diagnoses: Possible mistakes in the function. Each mistake, or pair of mistakes, explains all results,
+            or one column of a Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
