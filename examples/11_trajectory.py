@@ -1,6 +1,6 @@
 """Find a frame's largest velocity, largest acceleration and smallest singular value along a trajectory.
 
-You learn to plan a motion from rest to rest, to compute the whole motion of a frame, and to check it.
+You learn to make a straight joint motion from rest to rest, and to compute and check the motion of a frame.
 """
 
 import numpy as np

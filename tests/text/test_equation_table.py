@@ -105,6 +105,7 @@ def test_every_function_and_test_in_the_equation_table_exists() -> None:
     for equation in equations().values():
         assert equation.functions
         assert equation.tests
+        assert len({*equation.functions}) == len(equation.functions), equation.number
         for function in equation.functions:
             assert callable(resolve(function)), function
         for test in equation.tests:
