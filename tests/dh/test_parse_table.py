@@ -92,6 +92,13 @@ SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]]
         "modified",
         [(0, 0, 0.333, 0, "R"), (0.0825, -math.pi / 2, 0, math.pi, "R")],
     ),
+    "commas.md": (
+        "standard\n\n| Joint | θ | d [mm] | a [mm] | α |\n|---|---|---|---|---|\n"
+        "| J1 | q1 | 162,5 | 0 | 90° |\n"
+        "| J2 | q2 - 0,5 | 0 | -392,25 | 0 |\n",
+        "standard",
+        [(0, math.pi / 2, 0.1625, 0, "R"), (-0.39225, 0, 0, -0.5, "R")],
+    ),
     "paper.tex": (
         "In the classical convention,\n\\begin{tabular}{c|cccc}\\hline\nLink & $a_i$ & $\\alpha_i$ & $d_i$ &"
         " $\\theta_i$ \\\\ \\hline\n1 & $0$ & $\\pi/2$ & $0.4$ & $\\theta_1^*$ \\\\\n"

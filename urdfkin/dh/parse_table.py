@@ -154,7 +154,8 @@ def _find_grid(lines: list[str], split: Callable[[str], list[str]], separator: s
             rows.append(cells)
         else:
             end = len(lines)
-        return _Grid(columns, rows, [*lines[:k], *lines[end:]], separator in (";", "\t"), separator == ",")
+        others, decimal_commas = [*lines[:k], *lines[end:]], separator in (";", "\t", "|")
+        return _Grid(columns, rows, others, decimal_commas, separator == ",")
     return None
 
 
@@ -203,7 +204,7 @@ def _parse_bars(lines: list[str]) -> _Grid | None:
     def split(line: str) -> list[str]:
         return [cell.strip().strip("`") for cell in line.strip().strip("|").split("|")] if "|" in line else []
 
-    return _find_grid(plain, split)
+    return _find_grid(plain, split, "|")
 
 
 def _parse_separated(lines: list[str]) -> _Grid | None:

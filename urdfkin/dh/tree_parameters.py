@@ -8,10 +8,11 @@ frame i:
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The axis x_i is along the common normal of two axes: the axis of link i, and the axis of the first moving
-child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table equals
-the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified table, and the
-parameter r is called d(i). The angle beta is not part of the original notation, and is zero unless two axes
-are nearly parallel. Without beta, nearly parallel axes may need offsets of kilometres (Hayati).
+child of link i. Therefore, gamma and b of this child are zero. For a chain without branches, the table has
+the form of the modified Denavit-Hartenberg table. The parameter d is then called a(i-1) in the modified
+table, and the parameter r is called d(i). Frame 0, the last row and parallel axes follow other rules. The
+angle beta is not part of the original notation, and is zero unless two axes are nearly parallel. Without
+beta, nearly parallel axes may need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
