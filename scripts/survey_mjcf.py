@@ -24,8 +24,9 @@ def describe_result(path: Path) -> str:
     if not certificate.verified:
         return "not verified"
     shapes, _, remark = certificate.source_notes.partition("Pinocchio's MJCF reader")
-    suffix = ", without its shapes" if "does not compile" in shapes else ""
-    for phrase in ("agrees on the bodies", "disagrees", "does not accept", "other joints", "no such body"):
+    suffix = ", without its shapes" if "only without shapes" in shapes else ""
+    phrases = "agrees on the bodies", "disagrees", "does not accept", "different joints", "does not find"
+    for phrase in phrases:
         if phrase in remark:
             return f"verified{suffix}; Pinocchio's MJCF reader: {phrase}"
     return f"verified{suffix}; {remark}"

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from scripts.survey_mjcf import describe_result
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.reading import present
@@ -472,7 +473,7 @@ def test_a_file_that_asks_for_too_much_memory_is_refused(more: str) -> None:
 
 def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None:
     robot = loaded(free_body(more='<size njmax="80000" nconmax="40000" nstack="1000000000"/>'))
-    assert "does not compile" not in robot.verifier.source_notes
+    assert "without shapes" not in robot.verifier.source_notes
 
 
 def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -556,3 +557,23 @@ def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
     done = command("check", "--format", "json", str(path))
     lines = {one["name"]: one["line"] for one in done.data["findings"] if one["element"] == "equality"}
     assert lines == {"0": 1, "2": 1, "glue": 14}  # the index of an equality depends on the included file
+
+
+UNNAMED = f'<body pos="0 0 1">{MASS}{{}}</body><site'
+MESH = '<geom type="mesh" mesh="nope"/></body></worldbody><asset><mesh name="nope" file="nope.stl"/></asset>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "shapes", "expected"),
+    [
+        ("</mujoco>", "</mujoco>", "", "agrees on the bodies"),
+        ("</body></worldbody>", MESH, ", without its shapes", "agrees on the bodies"),
+        ("<site", UNNAMED.format(""), "", "does not find"),
+        ("<site", UNNAMED.format("<joint/>"), "", "different joints"),
+    ],
+)
+def test_the_survey_of_mjcf_files_counts_each_result_of_the_checks(
+    write: Write, old: str, new: str, shapes: str, expected: str
+) -> None:
+    path = write(one_joint('<joint name="a" axis="0 0 1"/>').replace(old, new), "one.xml")
+    assert describe_result(path) == f"verified{shapes}; Pinocchio's MJCF reader: {expected}"
