@@ -138,6 +138,22 @@ def test_tables_in_common_layouts_are_read_correctly(name: str, tmp_path: Path) 
     assert load(path, verify=False).nq == len(rows)
 
 
+COMMA_TABLE = "standard\n\n| θ | d [mm] | a [mm] | α |\n|---|---|---|---|\n| q1 | {} | {} | 0 |\n"
+
+
+@pytest.mark.parametrize(("d", "a"), [("1,000", "0"), ("-392,250", "0.5"), ("1,234,567", "0")])
+def test_a_comma_that_may_separate_thousands_is_refused(d: str, a: str) -> None:
+    with pytest.raises(InputError, match=r"decimal comma or separate thousands") as caught:
+        table_from_text(COMMA_TABLE.format(d, a), ".md")
+    assert caught.value.where is not None
+    assert "row 1, d" in caught.value.where
+
+
+def test_another_decimal_comma_of_the_table_decides_that_three_digits_are_decimals() -> None:
+    table = table_from_text(COMMA_TABLE.format("1,250", "0,5"), ".md")
+    assert (table.rows[0].d, table.rows[0].a) == (1.25e-3, 0.5e-3)
+
+
 def test_the_sign_of_a_joint_variable_is_the_sense_of_the_row() -> None:
     assert table_from_text(SHEETS["paper.tex"][0], ".tex").rows[1].sense == -1
     text = 'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]'

@@ -63,6 +63,10 @@ _TITLE = re.compile(
     r"(?:^|parameters of )(?:\*\*)?(?P<robot>\S+?)(?:\*\*)?[:,] (?P<base>\S+) to (?P<tip>\S+?),"
 )
 _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
+_NUMBER_COLUMNS = (*COLUMNS, "beta", "offset")
+_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
+#: A number such as 1,000: one with a decimal comma, or a thousand.
+_THOUSANDS = re.compile(r"(?<![0-9.,])[1-9][0-9]{0,2}(,[0-9]{3})+(?![0-9,])")
 
 
 def find_table_in_text(text: str) -> dict[str, Any]:
@@ -116,6 +120,7 @@ class _Grid:
 
     Attributes:
         other_lines: Lines outside the table.
+        decimal_commas: Whether a comma in a number can be a decimal comma.
         strict: Whether an unknown column is an error.
     """
 
@@ -124,6 +129,15 @@ class _Grid:
     other_lines: list[str]
     decimal_commas: bool = False
     strict: bool = False
+
+    @property
+    def has_clear_decimal_comma(self) -> bool:
+        """Whether a number such as 0,4 or 162,5 shows that commas are decimal."""
+        return any(
+            column.name in _NUMBER_COLUMNS and _COMMA.search(_THOUSANDS.sub("", cell))
+            for row in self.rows
+            for column, cell in zip(self.columns, row, strict=True)
+        )
 
 
 # -- the table's position ------------------------------------------------------------------------------
@@ -333,9 +347,9 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
             row[column.heading] = cell  # `table_from_mapping` rejects this heading.
         elif not column.name or (not cell and column.name not in COLUMNS):
             continue
-        elif column.name in (*COLUMNS, "beta", "offset"):
+        elif column.name in _NUMBER_COLUMNS:
             where = f"row {index + 1}, {column.name}"
-            row[column.name] = _add_unit(cell, column, where, grid.decimal_commas)
+            row[column.name] = _add_unit(cell, column, where, grid)
         elif column.name == "kind":
             row["kind"] = _KINDS.get(cell, cell)
         else:
@@ -345,8 +359,15 @@ def _parse_row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
     return _nest_row(row)
 
 
-def _add_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
-    text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", original) if decimal_commas else original
+def _add_unit(original: str, column: _Column, where: str, grid: _Grid) -> str:
+    text = _COMMA.sub(".", original) if grid.decimal_commas else original
+    if grid.decimal_commas and _THOUSANDS.search(original) and not grid.has_clear_decimal_comma:
+        raise InputError(
+            "the comma can be a decimal comma or separate thousands",
+            where=where,
+            found=safe_repr(original),
+            remedy="write a decimal point, or no comma in a large number",
+        )
     try:
         cell = parse_cell(text)
     except InvalidCellError as error:
