@@ -37,7 +37,7 @@ from urdfkin.validation.collector import CampaignProgress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
 from urdfkin.validation.robot_input import make_robot_input
-from urdfkin.validation.store import Store
+from urdfkin.validation.store import Store, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 60
@@ -447,7 +447,7 @@ def test_a_full_disk_is_reported_and_the_stored_chunks_are_reused(undisturbed: s
 
     full = _run(tmp_path / "s", preexec_fn=limit)
     assert full.returncode == 3, full.stderr
-    words = "the store cannot be written: found File too large; free some disk space"
+    words = "the store cannot be written: found File too large; free some disk space, and"
     assert words in " ".join(full.stdout.split())
     assert numbers(run_all(tmp_path / "s")) == undisturbed
 
@@ -486,9 +486,27 @@ def test_status_lists_finished_failed_and_missing_chunks(tmp_path: Path) -> None
     assert "chunks: 3 done, 3 missing" in found.text
     assert "failed: 'no such robot': " in found.text
     assert "on one processor" in found.text
-    assert "no process is running" in found.text
+    assert "no process uses the store" in found.text
     run_all(tmp_path)
     assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
+
+
+def test_status_names_the_process_of_a_running_shard(tmp_path: Path) -> None:
+    interrupt(tmp_path, 2)
+    manifest = Store.open_read_only(tmp_path, print).manifest
+    with open_store(tmp_path, manifest, print, shard="1/2"):
+        found = run("report status", str(tmp_path)).text
+    assert f"the store is in use by: process {os.getpid()} on " in found
+    assert "no process uses the store" not in found
+    assert "no process uses the store" in run("report status", str(tmp_path)).text
+
+
+def test_only_a_full_disk_gives_the_advice_to_free_disk_space(tmp_path: Path) -> None:
+    interrupt(tmp_path, 2)
+    with open_store(tmp_path, Store.open_read_only(tmp_path, print).manifest, print) as store:
+        (tmp_path / "plain").write_text("")
+        with pytest.raises(SourceError, match="correct the folder or its permissions, and repeat"):
+            store.write("plain/file", b"")
 
 
 @pytest.mark.slow

@@ -196,7 +196,7 @@ def status(context: click.Context, folder: Path) -> None:
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
     elif missing:
-        say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
+        say("no process uses the store; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
         say("to validate the failed robots again, add `--retry failed` to the `urdfkin validate` command")
     context.exit(3 if missing or failed else 0)

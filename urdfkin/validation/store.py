@@ -255,11 +255,18 @@ class Store:
             )
 
     def writing_process(self) -> str | None:
-        try:
-            with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
-                return None if _try_lock(file, fcntl.LOCK_SH) else _read_holder(file)
-        except OSError:
-            return None
+        """Return a process that writes to the store; None if there is no such process.
+
+        The processes of a sharded validation share the store's lock, and each process locks its own file.
+        """
+        for path in (self.folder / _LOCK, *sorted(self.folder.glob(f"{_LOCK}-*"))):
+            try:
+                with _lock_file(path, os.O_RDONLY) as file:
+                    if not _try_lock(file, fcntl.LOCK_SH):
+                        return _read_holder(file)
+            except OSError:
+                continue
+        return None
 
     def write(self, name: str, data: bytes) -> None:
         self._write(self.folder / name, data)
@@ -294,8 +301,13 @@ class Store:
                 "the store cannot be written",
                 where=str(self.folder),
                 found=error.strerror or str(error),
-                remedy="free some disk space and repeat the same command; finished chunks are kept",
+                remedy=f"{_remedy(error)}, and repeat the same command; finished chunks are kept",
             ) from error
+
+
+def _remedy(error: OSError) -> str:
+    is_full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return "free some disk space" if is_full else "correct the folder or its permissions"
 
 
 @contextlib.contextmanager
