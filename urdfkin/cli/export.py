@@ -206,6 +206,8 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
 
     if folder is None:
         raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")
+    if robots:
+        reject_unused_options(click.get_current_context(), ("catalogue",), "with a ROBOT")
     loaded = [load_robot(robot, verify=False) for robot in robots]
     names = [vectors.name_of(robot) for robot in loaded]
     if len({vectors.file_stem(name).casefold() for name in names}) < len(names):

@@ -453,11 +453,12 @@ def read_inputs(
 ) -> Inputs:
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    If one of the arrays has several samples, single samples of the other arrays are repeated.
+    If one of the arrays has several samples, single samples of the other arrays are repeated. `option` is the
+    option that gives q. The caller checks --seed if the command has several such options.
     """
     import numpy as np
 
-    if not any(text.startswith("random") for text in (q, v, a)):
+    if option == "--q" and not any(text.startswith("random") for text in (q, v, a)):
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
     texts = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))

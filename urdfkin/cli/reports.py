@@ -12,7 +12,14 @@ import click
 
 from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import report_crash, report_error
-from urdfkin.cli.options import FILE, NumberInRange, combine, markdown_option, schema_option
+from urdfkin.cli.options import (
+    FILE,
+    NumberInRange,
+    combine,
+    markdown_option,
+    reject_unused_options,
+    schema_option,
+)
 from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, make_console
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
@@ -127,6 +134,8 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
 
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
+    if any(files.values()):
+        reject_unused_options(context, ("cases",), "if the report is written to a file")
     document = read_stored_document(results) if is_folder(results) else read_document(results)
     check_writable(*files.values())
     failed = write_reports(document, files)

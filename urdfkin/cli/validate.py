@@ -232,6 +232,8 @@ def validate_command(
         raise click.UsageError(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
+    if not with_study:
+        reject_unused_options(context, ("accuracy_samples", "accuracy_moving_base"), "without --accuracy")
     if shard and any(files.values()):
         raise click.UsageError(
             "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"

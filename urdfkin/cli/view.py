@@ -21,6 +21,7 @@ from urdfkin.cli.options import (
     read_inputs,
     read_motion,
     reference_option,
+    reject_unused_options,
     robot_argument,
     samples_option,
     seed_option,
@@ -54,7 +55,10 @@ if TYPE_CHECKING:
 @trajectory_option("Play the samples of this file.")
 @convention_of_input_option
 @click.option("--port", type=WholeNumber(1, 65535), default=8080, help="Port to listen on.")
+@click.pass_context
 def view_command(
+    context: click.Context,
+    /,
     robot: str,
     q: str,
     seed: int,
@@ -81,6 +85,8 @@ def view_command(
     from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer
 
+    if q == "neutral":
+        reject_unused_options(context, ("seed",), "without a random --q")
     loaded = load_robot(robot)
     conversion = find_conversion(loaded, convention)
     start = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
@@ -195,6 +201,10 @@ def plot_command(
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
+    if trajectory is not None:
+        reject_unused_options(context, ("start", "duration", "samples", "seed"), "with --trajectory")
+    elif not any(text.startswith("random") for text in (start, end or "")):
+        reject_unused_options(context, ("seed",), "without a random --from or --to")
     from urdfkin.robot.frame_motion import frame_motion
     from urdfkin.view.figure import save
     from urdfkin.view.plot import caption, plot_motion
