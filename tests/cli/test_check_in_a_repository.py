@@ -480,6 +480,7 @@ def test_an_unknown_git_version_is_an_error_with_a_remedy(repository: Path, vers
 
 def test_a_commit_without_common_history_is_an_error_with_a_remedy(repository: Path) -> None:
     git("checkout", "-q", "--orphan", "other")
+    put("other.urdf")
     commit()
     git("checkout", "-q", "work")
     err = refused("check", "--changed-since=other")

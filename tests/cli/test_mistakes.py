@@ -140,7 +140,7 @@ MISTAKES = {
     "validate ur5 --accuracy-moving-base": "--accuracy-moving-base does nothing without --accuracy",
     "verify f.py ur5 --timeout 3": "--timeout does nothing without --program",
     "vectors write v ur5 --no-catalogue": "--catalogue/--no-catalogue does nothing with a ROBOT",
-    "report r.json --cases --html r.html": "--cases/--no-cases does nothing if the report is written to a file",
+    "report r.json --cases --html r.html": "does nothing if the report is written to a file",
     "plot ur5 --trajectory m.csv --duration 2 -o a.svg": "--duration does nothing with --trajectory",
     "plot ur5 --trajectory m.csv --samples 9 -o a.svg": "--samples does nothing with --trajectory",
     "plot ur5 --trajectory m.csv --from ready -o a.svg": "--from does nothing with --trajectory",
