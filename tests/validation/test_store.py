@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from tests.attacks.test_validation_runs import Refusing, chunks
+from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, results
@@ -499,6 +500,13 @@ def test_status_names_the_process_of_a_running_shard(tmp_path: Path) -> None:
     assert f"the store is in use by: process {os.getpid()} on " in found
     assert "no process uses the store" not in found
     assert "no process uses the store" in run("report status", str(tmp_path)).text
+
+
+def test_a_folder_that_is_not_a_store_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    for command in ("report", "report status"):
+        err = refused(command, str(tmp_path))
+        assert "this is not a folder with results of a validation: found no file manifest.json" in err
+        assert "give the folder of `urdfkin validate --store DIR`" in err
 
 
 def test_only_a_full_disk_gives_the_advice_to_free_disk_space(tmp_path: Path) -> None:

@@ -173,6 +173,13 @@ class Store:
     def open_read_only(cls, folder: Path, notify: Notify) -> Store:
         """Return a read-only store; another process may write to its folder."""
         path = folder / _MANIFEST
+        if not os.path.lexists(path):
+            raise SourceError(
+                "this is not a folder with results of a validation",
+                where=str(folder),
+                found=f"no file {_MANIFEST}",
+                remedy="give the folder of `urdfkin validate --store DIR`",
+            )
         return cls(folder, Manifest.from_json(read_bytes(path), str(path)), notify)
 
     def read_answer(self, robot: int, index: int) -> Answer | None:
