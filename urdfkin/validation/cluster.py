@@ -107,7 +107,7 @@ def _client(scheduler: str) -> Iterator[Client]:
         )
     if not number.isdecimal() or not int(number):
         raise InputError(
-            "`scheduler`: N in local:N must be the number of workers",
+            "`scheduler`: N in local:N must be a whole number, at least 1",
             found=repr(scheduler),
             remedy="give local:2",
         )

@@ -108,7 +108,9 @@ class ReportedModel(TypedDict):
     tip: Annotated[str, doc("Name of the default tip frame of chains.")]
     coordinates: Annotated[list[str], doc("Name of each coordinate in q.")]
     rates: Annotated[list[str], doc("Name of each entry of v and a.")]
-    frames: Annotated[list[str], doc("Names of all links and joints, as in Pinocchio.")]
+    frames: Annotated[
+        list[str], doc("Names of all frames (links and joints) in Pinocchio's order, each name once.")
+    ]
     links: Annotated[list[str], doc("Names of all links; links[i + 1] is the child of joints[i].")]
     joints: Annotated[list[ReportedJoint], doc("All joints; a parent link comes before its child links.")]
 
@@ -190,14 +192,15 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         doc(
-            "Largest disagreement of the tip's placement, Jacobian and acceleration, in eps * scale. The"
-            " entry covers both tables. null: a result is NaN, or there is no comparison."
+            "Largest disagreement of the tip's placement, Jacobian and acceleration of both tables, in eps"
+            " * scale. null: a result is NaN, two values with the bound 0 differ, or there is no comparison."
         ),
     ]
     bound_ratio: Annotated[
         float | None,
         doc(
-            "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
+            "Largest ratio of a disagreement to its bound. null: a result is NaN, two values with the bound"
+            " 0 differ, or there is no comparison."
         ),
     ]
 
@@ -278,8 +281,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong: either no two libraries agree, or one"
-            " library agrees with both others, but these two disagree."
+            "Number of results that do not show which library is wrong. Either no two of the three libraries"
+            " agree, or one library agrees with the two others, and these two disagree."
         ),
     ]
 
@@ -399,8 +402,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds. In a report from a folder of stored results, the"
-            " entry is the sum of the robots' computing times."
+            "Wall time of the validation in seconds. In a report that `urdfkin report DIR` makes from a"
+            " store: the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]
