@@ -205,7 +205,7 @@ def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None
     done = urdfkin(*words, "--shard", "2/2")
     assert done.code == 0, done.err
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
-    assert "next: run `urdfkin report merge" in done.text
+    assert "after all parts: run `urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130
     assert urdfkin(*words, "--shard", "1/2").code == 0
     assert urdfkin("report", where).code == 0

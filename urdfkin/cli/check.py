@@ -226,9 +226,9 @@ settings_options = combine(
 )  # fmt: skip
 _LIMITS = {
     "bytes": "Largest size of a file in bytes.",
-    "depth": "Largest nesting depth of elements.",
-    "elements": "Largest number of elements in a file.",
-    "attributes": "Largest number of attributes of an element.",
+    "depth": "Largest nesting depth of XML elements.",
+    "elements": "Largest number of XML elements in a file.",
+    "attributes": "Largest number of attributes of an XML element.",
     "name": "Largest number of characters in a name.",
     "number": "Largest number of characters in a number.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",

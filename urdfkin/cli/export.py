@@ -178,8 +178,8 @@ def vectors_command() -> None:
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
-    " files of example-robot-data.",
+    help="Without ROBOT: write test vectors of the robots of the catalogue, in addition to those of the small"
+    " robots. Test vectors of the catalogue refer to files of example-robot-data.",
 )
 @samples_option(
     3,

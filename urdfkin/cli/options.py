@@ -199,7 +199,7 @@ def root_joint_option(help_: str) -> Callable[[_F], _F]:
 robot_options = combine(
     mimic_option(
         "Couple each mimic joint to the joint that it mimics, as in the URDF.",
-        "mimic, except for a few robots of the catalogue",
+        "mimic; no-mimic for a few robots that `urdfkin robots` lists",
     ),
     root_joint_option("Add a moving joint between the world and the root link."),
     source_options,
@@ -210,8 +210,8 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. A fixed joint"
-        " without a given value then has the value in this pose instead of 0.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. This pose then gives"
+        " the value of each fixed joint for which --lock has no value.",
     ),
     click.option(
         "--joints",

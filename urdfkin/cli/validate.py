@@ -225,7 +225,7 @@ def validate_command(
     files = {name: options.pop(name) for name in FILES}
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("name robots, or give --all (every robot of example-robot-data)")
+        raise click.UsageError("give either robots, or --all (every robot of example-robot-data)")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard need --store DIR")
     if scheduler and (options["jobs"] > 1 or options["isolate"]):
@@ -326,4 +326,4 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
         f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound,"
         f" {report.seconds:.1f} s"
     )
-    say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")
+    say("after all parts: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     "--browser/--no-browser",
     default=None,
     help="Open the address in the browser.",
-    show_default="browser, if there is a screen",
+    show_default="browser, if there is a screen and the output is a terminal",
 )
 @trajectory_option("Play the samples of this file.")
 @convention_of_input_option

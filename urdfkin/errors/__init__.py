@@ -246,8 +246,8 @@ class RepresentationSingularityError(InputError):
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
-            f"the Euler angles {sequence} are at their representational singularity: "
-            "some angular velocities correspond to no angle rates",
+            f"the Euler angles {sequence} are at their representational singularity, or too near to it: "
+            "at the singularity, some angular velocities correspond to no angle rates",
             where=f"sample {list(sample)}" if sample else None,
             found=f"a middle angle {distance:.3g} rad from it",
             remedy="describe the orientation by another sequence or by a quaternion",
