@@ -198,6 +198,13 @@ def test_a_log_gets_progress_lines_at_intervals_and_none_for_a_short_run(
     assert done.err.endswith("left, none failed; planar_two_link\n")
 
 
+def test_a_shard_without_a_chunk_succeeds_and_states_the_reason(tmp_path: Path) -> None:
+    words = ("validate", "planar_two_link", "--samples", "0", "--store", str(tmp_path / "s"))
+    done = urdfkin(*words, "--shard", "1/2")
+    assert (done.code, done.err) == (0, "")
+    assert "nothing to do, because the validation has fewer chunks than parts" in done.text
+
+
 @pytest.mark.slow
 def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None:
     where = str(tmp_path / "s")

@@ -264,7 +264,8 @@ def validate_command(
             report = study_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
     if shard:
         _say_shard(report, shard, store)
-        context.exit(stop.exit_code(report.exit_code))
+        is_empty = not report.robots and not report.interrupted
+        context.exit(stop.exit_code(0 if is_empty else report.exit_code))
     document = report.as_dict()
     written = write_reports(document, files)
     print_report(document, make_console(), cases=cases)
@@ -320,6 +321,9 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
     for robot in report.robots:
         if robot.reason is not None:
             say(f"{robot.source}: {robot.verdict}: {robot.reason}")
+    if not report.robots and not report.interrupted:
+        say(f"shard {shard} of {store}: nothing to do, because the validation has fewer chunks than parts")
+        return
     results = sum(robot.results for robot in report.robots)
     say(
         f"shard {shard} of {store}: {format_count(len(report.robots), 'robot')}, {results:,} results"
