@@ -617,6 +617,9 @@ def test_fixes_that_rotate_a_joint_need_unsafe_fixes(here: Path) -> None:
     hint = "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
     assert hint in check().text
     assert check("--diff").err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
+    put("arm.urdf", text.replace("</robot>", '<joint name="loose"/></robot>'))
+    assert check("--diff").err.endswith("0 findings to fix in 1 file\n"), "an error prevents all fixes"
+    put("arm.urdf", text)
     check("--fix")
     assert arm.read_text() == text.replace("0 0 2", "0 0 1")
     assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err
