@@ -248,6 +248,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
     DIR is made if it does not exist.
     """
+    from urdfkin.report.words import format_count
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 
     others = [Store.open_read_only(store, warn) for store in stores]
@@ -255,12 +256,12 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
         for other in others[1:]:
             whole.check_same_campaign(other.manifest, other.folder)
         for other in others:
-            say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
+            say(f"{other.folder}: {format_count(whole.copy_missing(other), 'chunk')} copied")
         AccuracyStore.merge(whole, others)
         counts = whole.count_chunks()
         missing = _missing_chunks(whole, counts)
         _print_accuracy_progress(whole, counts)
-    say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks missing")
+    say(f"{folder}: complete" if not missing else f"{folder}: {format_count(missing, 'chunk')} missing")
 
 
 def warn(message: str) -> None:

@@ -208,7 +208,8 @@ class UnknownNameError(UrdfkinError, LookupError):
         if close:
             remedy = f"did you mean {', '.join(close)}?"
         elif names:
-            remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
+            count = "is 1" if len(names) == 1 else f"are {len(names)}"
+            remedy = f"there {count}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
         else:
             remedy = "there are none"
         super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy, question=question)
