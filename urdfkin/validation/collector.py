@@ -217,6 +217,6 @@ def _outside(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
         title = ORACLES[found.by].title
         words = "result of urdfkin disagrees" if found.urdfkin.failed == 1 else "results of urdfkin disagree"
         yield (
-            f"{found.urdfkin.failed:,} {words} with {title}; number of results in which only one library"
-            f" differs from the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,}"
+            f"{found.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
+            f" the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,})"
         )
