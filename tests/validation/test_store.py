@@ -502,6 +502,16 @@ def test_status_names_the_process_of_a_running_shard(tmp_path: Path) -> None:
     assert "no process uses the store" in run("report status", str(tmp_path)).text
 
 
+def test_stores_of_different_validations_are_not_merged(tmp_path: Path) -> None:
+    first, second, whole = (str(tmp_path / name) for name in ("first", "second", "whole"))
+    for folder, samples in ((first, 0), (second, 1)):
+        validate("planar_two_link", samples=samples, store=folder)
+    err = refused("report merge", whole, first, second)
+    assert f"{first}: the store belongs to another campaign" in err
+    assert f"(in the store, and in {second}) samples 0 and 1; merge only stores of one validation" in err
+    assert not Path(whole).exists()
+
+
 def test_a_folder_that_is_not_a_store_is_refused_with_a_remedy(tmp_path: Path) -> None:
     for command in ("report", "report status"):
         err = refused(command, str(tmp_path))

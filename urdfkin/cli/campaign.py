@@ -252,9 +252,9 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 
     others = [Store.open_read_only(store, warn) for store in stores]
+    for other in others[1:]:
+        others[0].check_same_campaign(other.manifest, other.folder)
     with open_store(folder, others[0].manifest, warn) as whole:
-        for other in others[1:]:
-            whole.check_same_campaign(other.manifest, other.folder)
         for other in others:
             say(f"{other.folder}: {format_count(whole.copy_missing(other), 'chunk')} copied")
         AccuracyStore.merge(whole, others)

@@ -253,12 +253,17 @@ class Store:
 
     def check_same_campaign(self, manifest: Manifest, where: object = None) -> None:
         if differences := self.manifest.differences(manifest):
-            there = "here" if where is None else f"in {where}"
+            there, remedy = (
+                "here",
+                "use the options, robot files and versions of this campaign, or another folder",
+            )
+            if where is not None:
+                there, remedy = f"in {where}", "merge only stores of one validation"
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
                 found=f"(in the store, and {there}) {'; '.join(differences)}",
-                remedy="use the options of the stored campaign, or another folder",
+                remedy=remedy,
             )
 
     def writing_process(self) -> str | None:
