@@ -60,7 +60,7 @@ def find_files(parts: list[str]) -> list[Path]:
     for part in parts:
         if not any(name.startswith(part) for name in found):
             raise ValueError(
-                f"{part}: no file that can have mutants has a path below {PACKAGE.name}/ that begins with"
+                f"{part}: no file below {PACKAGE.name}/ that can have mutants has a path that begins with"
                 " this text"
             )
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]

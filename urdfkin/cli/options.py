@@ -300,8 +300,8 @@ convention_of_input_option = _convention_option("the joint values that are read"
 
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
     files = (
-        "A CSV file has the columns t, NAME, v:NAME and a:NAME for each joint, with units such as"
-        " 'elbow [deg]'. An .npz file has the arrays t, q, v and a."
+        "A CSV file has a column NAME for each joint, and may have the columns t, v:NAME and a:NAME. A column"
+        " may state its unit, such as 'elbow [deg]'. An .npz file has the array q, and may have t, v and a."
     )
     return click.option("--trajectory", type=FILE, help=f"{help_} {files}")
 
@@ -481,7 +481,11 @@ def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArr
 
     n = max(map(len, batches))
     if any(len(batch) not in (1, n) for batch in batches):
-        raise InputError(problem, found=", ".join(str(len(batch)) for batch in batches))
+        raise InputError(
+            problem,
+            found=", ".join(str(len(batch)) for batch in batches),
+            remedy="give one sample, or the same number of samples, for each of them",
+        )
     return [np.ascontiguousarray(np.broadcast_to(batch, (n, *batch.shape[1:]))) for batch in batches]
 
 

@@ -33,7 +33,10 @@ FILES = ("json_", "html", "junit", "markdown")
 report_options = combine(
     click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),
     click.option(
-        "--html", type=FILE, help="Write the report to this file as an HTML page that works offline."
+        "--html",
+        type=FILE,
+        help="Write the report to this file as an HTML page that works offline. If the page is long, the"
+        " robots' details are in a folder beside it, such as report-robots.",
     ),
     click.option(
         "--junit",
