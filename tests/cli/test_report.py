@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.cli import running
@@ -12,6 +13,8 @@ from tests.cli.running import Done, refused
 from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import SpeedEstimator, format_progress
+from urdfkin.cli.view import _line
+from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.collector import CampaignProgress
 
@@ -144,6 +147,11 @@ def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
     assert done.code == 0, done.err
     assert "11 samples, verified by Pinocchio" in done.text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_line_between_two_random_configurations_moves_the_robot() -> None:
+    motion = _line(load("ur5"), "random", "random", 1.0, 3, 0, None)
+    assert not np.allclose(motion.q[0], motion.q[-1])
 
 
 # -- progress ----------------------------------------------------------------------------------------

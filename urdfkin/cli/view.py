@@ -228,9 +228,11 @@ def _line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
+    # With one seed, two random configurations would be equal.
+    other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
-        read_inputs(robot, None, seed, text, option=option, conversion=conversion).q
-        for option, text in (("--from", start), ("--to", end))
+        read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q
+        for option, text, own_seed in (("--from", start, seed), ("--to", end, other_seed))
     )
     if len(first) != 1 or len(last) != 1:
         raise InputError("--from and --to need one configuration each", found=f"{len(first)} and {len(last)}")
