@@ -164,7 +164,7 @@ def test_a_failed_robot_is_retried_on_request_with_a_changed_text(tmp_path: Path
     robots, store = [str(good), str(bad)], tmp_path / "store"
     assert validate(robots, samples=0, store=store).robots[1].verdict == ValidationVerdict.BAD_INPUT
     robot_file(bad, "mended")
-    with pytest.raises(InputError, match="another campaign"):
+    with pytest.raises(InputError, match="with --retry failed, the file of a failed robot may differ"):
         validate(robots, samples=0, store=store)
     again = validate(robots, samples=0, store=store, retry="failed")
     assert [robot.name for robot in again.robots] == ["a", "mended"]
@@ -510,6 +510,20 @@ def test_stores_of_different_validations_are_not_merged(tmp_path: Path) -> None:
     assert f"{first}: the store belongs to another campaign" in err
     assert f"(in the store, and in {second}) samples 0 and 1; merge only stores of one validation" in err
     assert not Path(whole).exists()
+
+
+def test_status_prints_the_reason_of_a_failure_on_one_line(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text("<robot/>")
+    validate(str(bad), samples=0, store=tmp_path / "store")
+    line = next(
+        line
+        for line in run("report status", str(tmp_path / "store")).text.splitlines()
+        if line.startswith("  failed: ")
+    )
+    assert "; run 'urdfkin explain" in line
+    assert " error: " in line
+    assert "\\n" not in line
 
 
 def test_a_folder_that_is_not_a_store_is_refused_with_a_remedy(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ import click
 
 from urdfkin.cli.options import FOLDER
 from urdfkin.cli.output import make_console
-from urdfkin.cli.streams import say
+from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def _failure_reason(store: Store, robot: int) -> str:
     from urdfkin.validation.answer import Failure
 
     answers = (store.read_answer(robot, index) for index in range(len(store.manifest.chunking)))
-    return next((f": {answer.reason}" for answer in answers if isinstance(answer, Failure)), "")
+    return next((f": {join_lines(answer.reason)}" for answer in answers if isinstance(answer, Failure)), "")
 
 
 def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:

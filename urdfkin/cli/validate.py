@@ -25,7 +25,7 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import check_writable, make_console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.shell import complete_robot
-from urdfkin.cli.streams import say
+from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
@@ -75,7 +75,7 @@ def study_all(
                     if results is not None and is_lasting:
                         results.write(i, found)
                 if isinstance(found, FailedStudy):
-                    say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
+                    say(f"urdfkin: {robot.source}: no accuracy result: {join_lines(found.reason)}", err=True)
                 studies.append(None if isinstance(found, FailedStudy) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
@@ -320,7 +320,7 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
 
     for robot in report.robots:
         if robot.reason is not None:
-            say(f"{robot.source}: {robot.verdict}: {robot.reason}")
+            say(f"{robot.source}: {robot.verdict}: {join_lines(robot.reason)}")
     if not report.robots and not report.interrupted:
         say(f"shard {shard} of {store}: nothing to do, because the validation has fewer chunks than parts")
         return

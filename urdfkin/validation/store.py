@@ -257,6 +257,8 @@ class Store:
                 "here",
                 "use the options, robot files and versions of this campaign, or another folder",
             )
+            if any(difference.startswith("robot ") for difference in differences):
+                remedy += "; with --retry failed, the file of a failed robot may differ"
             if where is not None:
                 there, remedy = f"in {where}", "merge only stores of one validation"
             raise InputError(
