@@ -83,7 +83,7 @@ def main() -> None:
         sys.exit(f"the tag is {options.tag}, and pyproject.toml has version {read_version()}")
     options.folder.mkdir(parents=True, exist_ok=True)
     if any(options.folder.iterdir()):
-        sys.exit(f"{options.folder} is not empty; name a new folder")
+        sys.exit(f"{options.folder} is not empty; name a new or an empty folder")
     files = build(options.folder.resolve())
     check_reproducible(files)
     _run(sys.executable, "-m", "twine", "check", "--strict", *files)

@@ -257,7 +257,9 @@ def can_represent(form: str, table: DHTable) -> bool:
 
 def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--leaves", action="store_true", help="check every leaf link, not only the tips")
+    parser.add_argument(
+        "--leaves", action="store_true", help="check every leaf link of each robot, not only its default tip"
+    )
     parser.add_argument("--toolbox", metavar="PYTHON", help="Python interpreter that has roboticstoolbox")
     forms = (*RUN, "latex")
     parser.add_argument("--forms", nargs="+", choices=forms, default=forms, metavar="FORM")

@@ -72,7 +72,8 @@ def summarize(results: list[dict[str, Any]]) -> Iterator[str]:
     missed = [result for result in bounded if not result["holds"]]
     robots = len({result["robot"] for result in results})
     yield f"{len(results) - len(wrong)} of {len(results)} verdicts right, {robots} robots"
-    yield f"{len(bounded) - len(missed)} of {len(bounded)} intervals contain the result of the search"
+    held = len(bounded) - len(missed)
+    yield f"{held} of {len(bounded)} intervals contain the largest distance that the search found"
     for change in UNLIKE:
         upper_ratios = [
             result["upper"] / result["truth"]

@@ -79,7 +79,8 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/errors.md": (
         "Errors",
-        "All exceptions derive from `UrdfkinError`; a message has a location, the value found and a remedy.",
+        "All errors derive from `UrdfkinError`. A message states the problem, and usually the place, the"
+        " value found and the remedy.",
         "UrdfkinError InputError UnknownNameError SourceError UrdfError TableError "
         "VerificationError NotVerifiedWarning UrdfWarning DegreesWarning",
     ),

@@ -60,7 +60,8 @@ def find_files(parts: list[str]) -> list[Path]:
     for part in parts:
         if not any(name.startswith(part) for name in found):
             raise ValueError(
-                f"{part}: no file below {PACKAGE.name}/ that can have mutants begins with this path"
+                f"{part}: no file below {PACKAGE.name}/ that can have mutants has a path that begins with"
+                " this text"
             )
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 

@@ -474,8 +474,18 @@ def test_all_findings_of_a_new_xacro_file_are_reported(repository: Path) -> None
 @pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
 def test_an_unknown_git_version_is_an_error_with_a_remedy(repository: Path, version: str) -> None:
     err = refused("check", f"--changed-since={version}")
-    assert "git finds no common ancestor of this commit and HEAD" in err
+    assert "git finds no branch, tag or commit with this name; correct the name, or fetch" in err
     assert "fetch-depth: 0" in err
+
+
+def test_a_commit_without_common_history_is_an_error_with_a_remedy(repository: Path) -> None:
+    git("checkout", "-q", "--orphan", "other")
+    put("other.urdf")
+    commit()
+    git("checkout", "-q", "work")
+    err = refused("check", "--changed-since=other")
+    assert "other: git finds no common ancestor of this commit and HEAD" in err
+    assert "fetch the history of both commits first" in err
 
 
 def test_without_a_repository_or_without_git_the_error_states_this(
@@ -607,6 +617,9 @@ def test_fixes_that_rotate_a_joint_need_unsafe_fixes(here: Path) -> None:
     hint = "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
     assert hint in check().text
     assert check("--diff").err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
+    put("arm.urdf", text.replace("</robot>", '<joint name="loose"/></robot>'))
+    assert check("--diff").err.endswith("0 findings to fix in 1 file\n"), "an error prevents all fixes"
+    put("arm.urdf", text)
     check("--fix")
     assert arm.read_text() == text.replace("0 0 2", "0 0 1")
     assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.cli import running
@@ -12,6 +13,8 @@ from tests.cli.running import Done, refused
 from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import SpeedEstimator, format_progress
+from urdfkin.cli.view import _line
+from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.collector import CampaignProgress
 
@@ -139,11 +142,16 @@ def test_an_unwritable_report_leaves_existing_files_unchanged(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
-    words = "plot ur5 --to random --samples 11 --panel position -o"
+    words = "plot ur5 --to random --seed 1 --samples 11 --panel position -o"
     done = urdfkin(words, tmp_path / "a.png")
     assert done.code == 0, done.err
     assert "11 samples, verified by Pinocchio" in done.text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_line_between_two_random_configurations_moves_the_robot() -> None:
+    motion = _line(load("ur5"), "random", "random", 1.0, 3, 0, None)
+    assert not np.allclose(motion.q[0], motion.q[-1])
 
 
 # -- progress ----------------------------------------------------------------------------------------
@@ -198,6 +206,13 @@ def test_a_log_gets_progress_lines_at_intervals_and_none_for_a_short_run(
     assert done.err.endswith("left, none failed; planar_two_link\n")
 
 
+def test_a_shard_without_a_chunk_succeeds_and_states_the_reason(tmp_path: Path) -> None:
+    words = ("validate", "planar_two_link", "--samples", "0", "--store", str(tmp_path / "s"))
+    done = urdfkin(*words, "--shard", "1/2")
+    assert (done.code, done.err) == (0, "")
+    assert "nothing to do, because the validation has fewer chunks than parts" in done.text
+
+
 @pytest.mark.slow
 def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None:
     where = str(tmp_path / "s")
@@ -205,7 +220,7 @@ def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None
     done = urdfkin(*words, "--shard", "2/2")
     assert done.code == 0, done.err
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
-    assert "next: run `urdfkin report merge" in done.text
+    assert "after all parts: run `urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130
     assert urdfkin(*words, "--shard", "1/2").code == 0
     assert urdfkin("report", where).code == 0

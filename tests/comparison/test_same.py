@@ -380,6 +380,9 @@ def test_the_exit_code_of_same_states_the_verdict(tmp_path: Path) -> None:
     again = run("same", base, tilted, "--recheck", str(tmp_path / "certificate"))
     assert again.code == 1
     assert again.text.startswith("the certificate holds: differs; first difference: joint joint_4")
+    again = run("same", base, tilted, "--recheck", str(tmp_path / "certificate"), "--format", "json")
+    assert again.code == 1
+    assert json.loads(again.text) == {"holds": True, "verdict": "differs", "errors": []}
     message = refused("same", base, flipped, "--recheck", str(tmp_path / "certificate"))
     assert "another version of this robot" in message
 

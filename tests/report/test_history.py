@@ -189,3 +189,9 @@ def test_the_suffix_selects_the_page_whose_colour_is_that_of_the_latest_verdict(
     assert '<div class="verdict bad">' in pages[0]
     assert "2 runs; latest verdict: disagrees, before: verified" in pages[0]
     assert '<div class="verdict good">' in pages[1]
+
+
+def test_the_schema_describes_the_ratio_to_the_bound_as_a_ratio() -> None:
+    types = module.HISTORY.schema()["$defs"]
+    for name in ("ValidationRun", "Point"):
+        assert "ratio" in types[name]["properties"]["bound_ratio"]["description"]

@@ -450,7 +450,7 @@ def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tm
     assert done.code == 1, done.err
     data = done.data
     if fault == "nan":
-        assert data["diagnoses"] == ["1 results are not finite"]
+        assert data["diagnoses"] == ["1 result is not finite"]
     else:
         assert words in data["first_errors"][0]["message"]
     assert data["compared"] >= 10 - 3

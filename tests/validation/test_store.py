@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from tests.attacks.test_validation_runs import Refusing, chunks
+from tests.cli.running import refused
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, results
@@ -37,7 +38,7 @@ from urdfkin.validation.collector import CampaignProgress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
 from urdfkin.validation.robot_input import make_robot_input
-from urdfkin.validation.store import Store
+from urdfkin.validation.store import Store, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 60
@@ -163,7 +164,7 @@ def test_a_failed_robot_is_retried_on_request_with_a_changed_text(tmp_path: Path
     robots, store = [str(good), str(bad)], tmp_path / "store"
     assert validate(robots, samples=0, store=store).robots[1].verdict == ValidationVerdict.BAD_INPUT
     robot_file(bad, "mended")
-    with pytest.raises(InputError, match="another campaign"):
+    with pytest.raises(InputError, match="with --retry failed, the file of a failed robot may differ"):
         validate(robots, samples=0, store=store)
     again = validate(robots, samples=0, store=store, retry="failed")
     assert [robot.name for robot in again.robots] == ["a", "mended"]
@@ -447,7 +448,7 @@ def test_a_full_disk_is_reported_and_the_stored_chunks_are_reused(undisturbed: s
 
     full = _run(tmp_path / "s", preexec_fn=limit)
     assert full.returncode == 3, full.stderr
-    words = "the store cannot be written: found File too large; free some disk space"
+    words = "the store cannot be written: found File too large; free some disk space, and"
     assert words in " ".join(full.stdout.split())
     assert numbers(run_all(tmp_path / "s")) == undisturbed
 
@@ -486,9 +487,58 @@ def test_status_lists_finished_failed_and_missing_chunks(tmp_path: Path) -> None
     assert "chunks: 3 done, 3 missing" in found.text
     assert "failed: 'no such robot': " in found.text
     assert "on one processor" in found.text
-    assert "no process is running" in found.text
+    assert "no process uses the store" in found.text
     run_all(tmp_path)
     assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
+
+
+def test_status_names_the_process_of_a_running_shard(tmp_path: Path) -> None:
+    interrupt(tmp_path, 2)
+    manifest = Store.open_read_only(tmp_path, print).manifest
+    with open_store(tmp_path, manifest, print, shard="1/2"):
+        found = run("report status", str(tmp_path)).text
+    assert f"the store is in use by: process {os.getpid()} on " in found
+    assert "no process uses the store" not in found
+    assert "no process uses the store" in run("report status", str(tmp_path)).text
+
+
+def test_stores_of_different_validations_are_not_merged(tmp_path: Path) -> None:
+    first, second, whole = (str(tmp_path / name) for name in ("first", "second", "whole"))
+    for folder, samples in ((first, 0), (second, 1)):
+        validate("planar_two_link", samples=samples, store=folder)
+    err = refused("report merge", whole, first, second)
+    assert f"{first}: the store belongs to another campaign" in err
+    assert f"(in the store, and in {second}) samples 0 and 1; merge only stores of one validation" in err
+    assert not Path(whole).exists()
+
+
+def test_status_prints_the_reason_of_a_failure_on_one_line(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text("<robot/>")
+    validate(str(bad), samples=0, store=tmp_path / "store")
+    line = next(
+        line
+        for line in run("report status", str(tmp_path / "store")).text.splitlines()
+        if line.startswith("  failed: ")
+    )
+    assert "; run 'urdfkin explain" in line
+    assert " error: " in line
+    assert "\\n" not in line
+
+
+def test_a_folder_that_is_not_a_store_is_refused_with_a_remedy(tmp_path: Path) -> None:
+    for command in ("report", "report status"):
+        err = refused(command, str(tmp_path))
+        assert "this is not a folder with results of a validation: found no file manifest.json" in err
+        assert "give the folder of `urdfkin validate --store DIR`" in err
+
+
+def test_only_a_full_disk_gives_the_advice_to_free_disk_space(tmp_path: Path) -> None:
+    interrupt(tmp_path, 2)
+    with open_store(tmp_path, Store.open_read_only(tmp_path, print).manifest, print) as store:
+        (tmp_path / "plain").write_text("")
+        with pytest.raises(SourceError, match="correct the folder or its permissions, and repeat"):
+            store.write("plain/file", b"")
 
 
 @pytest.mark.slow

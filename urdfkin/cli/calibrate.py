@@ -55,7 +55,8 @@ _FORMS = (*TEXT_FORMATS, "json")
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
-    help="With --ur: order of the roll, pitch and yaw rotations in the file.",
+    help="With --ur: rotation that roll, pitch and yaw in the file describe. driver: Rx(roll) Ry(pitch)"
+    " Rz(yaw). urdf: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.",
 )
 @path_options
 @click.option(

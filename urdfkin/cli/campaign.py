@@ -19,7 +19,7 @@ import click
 
 from urdfkin.cli.options import FOLDER
 from urdfkin.cli.output import make_console
-from urdfkin.cli.streams import say
+from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors.escape import escape_unprintable
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def status(context: click.Context, folder: Path) -> None:
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
     elif missing:
-        say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
+        say("no process uses the store; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
         say("to validate the failed robots again, add `--retry failed` to the `urdfkin validate` command")
     context.exit(3 if missing or failed else 0)
@@ -220,7 +220,7 @@ def _failure_reason(store: Store, robot: int) -> str:
     from urdfkin.validation.answer import Failure
 
     answers = (store.read_answer(robot, index) for index in range(len(store.manifest.chunking)))
-    return next((f": {answer.reason}" for answer in answers if isinstance(answer, Failure)), "")
+    return next((f": {join_lines(answer.reason)}" for answer in answers if isinstance(answer, Failure)), "")
 
 
 def _seconds_per_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
@@ -248,19 +248,20 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
     DIR is made if it does not exist.
     """
+    from urdfkin.report.words import format_count
     from urdfkin.validation.store import AccuracyStore, Store, open_store
 
     others = [Store.open_read_only(store, warn) for store in stores]
+    for other in others[1:]:
+        others[0].check_same_campaign(other.manifest, other.folder)
     with open_store(folder, others[0].manifest, warn) as whole:
-        for other in others[1:]:
-            whole.check_same_campaign(other.manifest, other.folder)
         for other in others:
-            say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
+            say(f"{other.folder}: {format_count(whole.copy_missing(other), 'chunk')} copied")
         AccuracyStore.merge(whole, others)
         counts = whole.count_chunks()
         missing = _missing_chunks(whole, counts)
         _print_accuracy_progress(whole, counts)
-    say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks missing")
+    say(f"{folder}: complete" if not missing else f"{folder}: {format_count(missing, 'chunk')} missing")
 
 
 def warn(message: str) -> None:

@@ -226,9 +226,9 @@ settings_options = combine(
 )  # fmt: skip
 _LIMITS = {
     "bytes": "Largest size of a file in bytes.",
-    "depth": "Largest nesting depth of elements.",
-    "elements": "Largest number of elements in a file.",
-    "attributes": "Largest number of attributes of an element.",
+    "depth": "Largest nesting depth of XML elements.",
+    "elements": "Largest number of XML elements in a file.",
+    "attributes": "Largest number of attributes of an XML element.",
     "name": "Largest number of characters in a name.",
     "number": "Largest number of characters in a number.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",
@@ -291,7 +291,8 @@ def check_command(context: click.Context, /, files: Sequence[str], **options: An
     file's package (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request.
     Settings are in the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
-    Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.
+    Exit 0: no error. 1: an error. 2: an unreadable file or a wrong option. With --diff, exit 0: no changes.
+    1: changes.
 
     \b
     Example:
@@ -482,11 +483,12 @@ class CheckRun:
         if self.diff:
             self.outcome.fixable_count += len(result.fixed_findings)
             self.outcome.patches.append(make_patch(file, text.data, result.text.data, escape_for_terminal))
-            chosen = choose()
-            self.outcome.unsafe_count += sum(
-                chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe
-                for f in self.look(result.text).findings
-            )
+            chosen, findings = choose(), self.look(result.text).findings
+            # --fix does not change a file with an error.
+            if not any(finding.severity is Severity.ERROR for finding in findings):
+                self.outcome.unsafe_count += sum(
+                    chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe for f in findings
+                )
             return text
         if result.fixed_findings:
             write_file(path, result.text.data)

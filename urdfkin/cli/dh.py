@@ -105,8 +105,8 @@ choice_options = combine(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "Rule for the directions of the x axes. theta: |theta| is at most 90 degrees. a: the length a is not"
-        " negative. alpha: the angle alpha is not negative.",
+        "Rule that chooses one of the two directions of each x axis. theta: |theta| is at most 90 degrees."
+        " a: the length a is not negative. alpha: the angle alpha is not negative.",
     ),
     _choice(
         "--slide",

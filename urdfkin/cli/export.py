@@ -178,8 +178,8 @@ def vectors_command() -> None:
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
-    " files of example-robot-data.",
+    help="Without ROBOT: write test vectors of the robots of the catalogue, in addition to those of the small"
+    " robots. Test vectors of the catalogue refer to files of example-robot-data.",
 )
 @samples_option(
     3,
@@ -206,6 +206,8 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
 
     if folder is None:
         raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")
+    if robots:
+        reject_unused_options(click.get_current_context(), ("catalogue",), "with a ROBOT")
     loaded = [load_robot(robot, verify=False) for robot in robots]
     names = [vectors.name_of(robot) for robot in loaded]
     if len({vectors.file_stem(name).casefold() for name in names}) < len(names):

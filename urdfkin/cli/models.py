@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: Options of `urdfkin same` that need exactly two robots
 _TWO_ROBOT_OPTIONS = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
+#: Options of `urdfkin same` that do nothing with --recheck: they affect only a new comparison.
+_COMPARING_OPTIONS = (*_TWO_ROBOT_OPTIONS, "strict", "within", "boxes")
 #: A git revision, such as HEAD~1, main^ or HEAD:arm.urdf.
 #: `urdfkin diff` rejects a revision, unless a file has this name.
 _GIT_VERSION = re.compile(r"HEAD|[\w./-]+[~^]\d*|[\w./~^-]+:[\w./-]+\.\w+")
@@ -142,10 +144,14 @@ def same_command(
 
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
+    context = click.get_current_context()
+    if recheck is not None:
+        unused = [name for name in _COMPARING_OPTIONS if name != "recheck"]
+        reject_unused_options(context, unused, "with --recheck")
     check_writable(*paths.values())
     question, most_boxes = SameQuestion(within, strict), MAX_BOXES if boxes is None else boxes
     if more:
-        reject_unused_options(click.get_current_context(), _TWO_ROBOT_OPTIONS, "with more than two robots")
+        reject_unused_options(context, _TWO_ROBOT_OPTIONS, "with more than two robots")
         return _all_pairs((a, b, *more), question, most_boxes)
     first, second = load_robots(a, b)
     robots = first, second
@@ -204,7 +210,8 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
     holds = f"the certificate holds: {certificate['verdict']}{''.join(first)}"
     words = "the certificate does not hold" if errors else holds
     code = int(bool(errors) or certificate["verdict"] == "differs")
-    return Answer(lambda: TextDocument("", [words]), code=code)
+    data = {"holds": not errors, "verdict": certificate["verdict"], "errors": errors}
+    return Answer(lambda: TextDocument("", [words]), {"json": lambda: data}, code=code)
 
 
 @click.command("diff", epilog="Example: urdfkin diff arm.urdf my.urdf --markdown comment.md")

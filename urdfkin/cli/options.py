@@ -199,7 +199,7 @@ def root_joint_option(help_: str) -> Callable[[_F], _F]:
 robot_options = combine(
     mimic_option(
         "Couple each mimic joint to the joint that it mimics, as in the URDF.",
-        "mimic, except for a few robots of the catalogue",
+        "mimic; no-mimic for a few robots that `urdfkin robots` lists",
     ),
     root_joint_option("Add a moving joint between the world and the root link."),
     source_options,
@@ -210,8 +210,8 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be the name of a pose, such as ready. A fixed joint"
-        " without a given value then has the value in this pose instead of 0.",
+        " With --joints, the first --lock may be the name of a pose, such as ready. This pose then gives"
+        " the value of each fixed joint for which --lock has no value.",
     ),
     click.option(
         "--joints",
@@ -300,8 +300,8 @@ convention_of_input_option = _convention_option("the joint values that are read"
 
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
     files = (
-        "A CSV file has the columns t, NAME, v:NAME and a:NAME for each joint, with units such as"
-        " 'elbow [deg]'. An .npz file has the arrays t, q, v and a."
+        "A CSV file has a column NAME for each joint, and may have the columns t, v:NAME and a:NAME. A column"
+        " may state its unit, such as 'elbow [deg]'. An .npz file has the array q, and may have t, v and a."
     )
     return click.option("--trajectory", type=FILE, help=f"{help_} {files}")
 
@@ -453,11 +453,12 @@ def read_inputs(
 ) -> Inputs:
     """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    If one of the arrays has several samples, single samples of the other arrays are repeated.
+    If one of the arrays has several samples, single samples of the other arrays are repeated. `option` is the
+    option that gives q. The caller checks --seed if the command has several such options.
     """
     import numpy as np
 
-    if not any(text.startswith("random") for text in (q, v, a)):
+    if option == "--q" and not any(text.startswith("random") for text in (q, v, a)):
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
     texts = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
@@ -480,7 +481,11 @@ def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArr
 
     n = max(map(len, batches))
     if any(len(batch) not in (1, n) for batch in batches):
-        raise InputError(problem, found=", ".join(str(len(batch)) for batch in batches))
+        raise InputError(
+            problem,
+            found=", ".join(str(len(batch)) for batch in batches),
+            remedy="give one sample, or the same number of samples, for each of them",
+        )
     return [np.ascontiguousarray(np.broadcast_to(batch, (n, *batch.shape[1:]))) for batch in batches]
 
 

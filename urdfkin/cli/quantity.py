@@ -314,7 +314,9 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
     def parts() -> Iterator[str | Table]:
         yield (
             "The numbers are in m/s^2 and rad/s^2. The kinds are terms of equation 7.125: transverse"
-            " (a z x d), centripetal, Coriolis (2 w x u) and sliding (a z)."
+            " (a z x d), centripetal, Coriolis (2 w x u) and sliding (a z). z is the joint's axis, a is the"
+            " joint's acceleration, and d is the vector from the joint to the frame. w is the angular"
+            " velocity of the joint's parent link, and u is the frame's velocity due to this joint alone."
         )
         yield from _format_samples(x, 2, "csv, json or npy", table)
 
@@ -449,7 +451,8 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         "--nearest",
         type=NumberInRange(min=0.0),
         metavar="RAD",
-        help="Smallest allowed distance (rad) from a representational singularity of the Euler angles.",
+        help="The command fails if the Euler angles are at this distance (rad) or less from their"
+        " representational singularity.",
         show_default="1e-9",
     ),
 )

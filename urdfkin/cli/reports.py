@@ -12,7 +12,14 @@ import click
 
 from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import report_crash, report_error
-from urdfkin.cli.options import FILE, NumberInRange, combine, markdown_option, schema_option
+from urdfkin.cli.options import (
+    FILE,
+    NumberInRange,
+    combine,
+    markdown_option,
+    reject_unused_options,
+    schema_option,
+)
 from urdfkin.cli.output import TEXT_FORMATS, Answer, answer_command, check_writable, make_console
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
@@ -26,7 +33,10 @@ FILES = ("json_", "html", "junit", "markdown")
 report_options = combine(
     click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),
     click.option(
-        "--html", type=FILE, help="Write the report to this file as an HTML page that works offline."
+        "--html",
+        type=FILE,
+        help="Write the report to this file as an HTML page that works offline. If the page is long, the"
+        " robots' details are in a folder beside it, such as report-robots.",
     ),
     click.option(
         "--junit",
@@ -127,6 +137,8 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
 
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
+    if any(files.values()):
+        reject_unused_options(context, ("cases",), "if the report is written to a file")
     document = read_stored_document(results) if is_folder(results) else read_document(results)
     check_writable(*files.values())
     failed = write_reports(document, files)
@@ -150,7 +162,8 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="Report a regression if a quantity's largest disagreement grows by more than this factor.",
+    help="Report a regression if a quantity's largest disagreement, or its largest ratio to its bound, grows"
+    " by more than this factor.",
 )
 @markdown_option
 @answer_command(*TEXT_FORMATS, "json")

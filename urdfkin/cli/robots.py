@@ -115,7 +115,8 @@ def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
 
 
 _NO_ORDER = (
-    "The joint order of idyntree follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
+    "The joint order of idyntree follows no known rule; give it as robot.convention('idyntree', joints=[...])"
+    ", or as `joints` in a TOML file"
 )
 
 

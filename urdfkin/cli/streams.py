@@ -218,6 +218,11 @@ def wrap_streams() -> None:
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 
+def join_lines(text: str) -> str:
+    """Return the lines of a text as one line, separated by semicolons."""
+    return "; ".join(map(str.strip, text.splitlines()))
+
+
 def say(line: str, *, err: bool = False) -> None:
     """Print one line with escaped control characters."""
     click.echo(escape_unprintable(line), err=err)

@@ -25,7 +25,7 @@ from urdfkin.cli.options import (
 from urdfkin.cli.output import check_writable, make_console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.shell import complete_robot
-from urdfkin.cli.streams import say
+from urdfkin.cli.streams import join_lines, say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.files import is_folder
 from urdfkin.system.lazy_import import install_command
@@ -75,7 +75,7 @@ def study_all(
                     if results is not None and is_lasting:
                         results.write(i, found)
                 if isinstance(found, FailedStudy):
-                    say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
+                    say(f"urdfkin: {robot.source}: no accuracy result: {join_lines(found.reason)}", err=True)
                 studies.append(None if isinstance(found, FailedStudy) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
@@ -225,13 +225,15 @@ def validate_command(
     files = {name: options.pop(name) for name in FILES}
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
     if bool(robots) == all_:
-        raise click.UsageError("name robots, or give --all (every robot of example-robot-data)")
+        raise click.UsageError("give either robots, or --all (every robot of example-robot-data)")
     if (retry or shard) and store is None:
         raise click.UsageError("--retry and --shard need --store DIR")
     if scheduler and (options["jobs"] > 1 or options["isolate"]):
         raise click.UsageError(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
+    if not with_study:
+        reject_unused_options(context, ("accuracy_samples", "accuracy_moving_base"), "without --accuracy")
     if shard and any(files.values()):
         raise click.UsageError(
             "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"
@@ -262,7 +264,8 @@ def validate_command(
             report = study_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
     if shard:
         _say_shard(report, shard, store)
-        context.exit(stop.exit_code(report.exit_code))
+        is_empty = not report.robots and not report.interrupted
+        context.exit(stop.exit_code(0 if is_empty else report.exit_code))
     document = report.as_dict()
     written = write_reports(document, files)
     print_report(document, make_console(), cases=cases)
@@ -317,11 +320,14 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
 
     for robot in report.robots:
         if robot.reason is not None:
-            say(f"{robot.source}: {robot.verdict}: {robot.reason}")
+            say(f"{robot.source}: {robot.verdict}: {join_lines(robot.reason)}")
+    if not report.robots and not report.interrupted:
+        say(f"shard {shard} of {store}: nothing to do, because the validation has fewer chunks than parts")
+        return
     results = sum(robot.results for robot in report.robots)
     say(
         f"shard {shard} of {store}: {format_count(len(report.robots), 'robot')}, {results:,} results"
         f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound,"
         f" {report.seconds:.1f} s"
     )
-    say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")
+    say("after all parts: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

@@ -19,6 +19,7 @@ from urdfkin.cli.options import (
     load_robot,
     oracle_option,
     reference_option,
+    reject_unused_options,
     robot_argument,
     samples_option,
     seed_option,
@@ -110,6 +111,8 @@ def verify_command(
     from urdfkin.validation.functions import verify_function
     from urdfkin.validation.programs import Program
 
+    if not program:
+        reject_unused_options(click.get_current_context(), ("timeout",), "without --program")
     check_writable(junit)
     loaded = load_robot(robot, oracle=oracle)
     with ExitStack() as stack:

@@ -21,6 +21,7 @@ from urdfkin.cli.options import (
     read_inputs,
     read_motion,
     reference_option,
+    reject_unused_options,
     robot_argument,
     samples_option,
     seed_option,
@@ -49,12 +50,15 @@ if TYPE_CHECKING:
     "--browser/--no-browser",
     default=None,
     help="Open the address in the browser.",
-    show_default="browser, if there is a screen",
+    show_default="browser, if there is a screen and the output is a terminal",
 )
 @trajectory_option("Play the samples of this file.")
 @convention_of_input_option
 @click.option("--port", type=WholeNumber(1, 65535), default=8080, help="Port to listen on.")
+@click.pass_context
 def view_command(
+    context: click.Context,
+    /,
     robot: str,
     q: str,
     seed: int,
@@ -81,6 +85,8 @@ def view_command(
     from urdfkin.view.server import has_screen, new_server, open_page
     from urdfkin.view.viewer import Viewer
 
+    if q == "neutral":
+        reject_unused_options(context, ("seed",), "without a random --q")
     loaded = load_robot(robot)
     conversion = find_conversion(loaded, convention)
     start = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
@@ -195,6 +201,10 @@ def plot_command(
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
+    if trajectory is not None:
+        reject_unused_options(context, ("start", "duration", "samples", "seed"), "with --trajectory")
+    elif not any(text.startswith("random") for text in (start, end or "")):
+        reject_unused_options(context, ("seed",), "without a random --from or --to")
     from urdfkin.robot.frame_motion import frame_motion
     from urdfkin.view.figure import save
     from urdfkin.view.plot import caption, plot_motion
@@ -218,9 +228,11 @@ def _line(
     from urdfkin.robot.trajectory import make_line_trajectory
 
     conversion = find_conversion(robot, convention)
+    # With one seed, two random configurations would be equal.
+    other_seed = seed + 1 if start.startswith("random") else seed
     first, last = (
-        read_inputs(robot, None, seed, text, option=option, conversion=conversion).q
-        for option, text in (("--from", start), ("--to", end))
+        read_inputs(robot, None, own_seed, text, option=option, conversion=conversion).q
+        for option, text, own_seed in (("--from", start, seed), ("--to", end, other_seed))
     )
     if len(first) != 1 or len(last) != 1:
         raise InputError("--from and --to need one configuration each", found=f"{len(first)} and {len(last)}")

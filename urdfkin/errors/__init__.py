@@ -208,7 +208,8 @@ class UnknownNameError(UrdfkinError, LookupError):
         if close:
             remedy = f"did you mean {', '.join(close)}?"
         elif names:
-            remedy = f"there are {len(names)}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
+            count = "is 1" if len(names) == 1 else f"are {len(names)}"
+            remedy = f"there {count}: {', '.join(names[:6])}{', ...' if len(names) > 6 else ''}"
         else:
             remedy = "there are none"
         super().__init__(f"unknown {kind} {name!r}", where=where, remedy=remedy, question=question)
@@ -246,8 +247,8 @@ class RepresentationSingularityError(InputError):
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
-            f"the Euler angles {sequence} are at their representational singularity: "
-            "some angular velocities correspond to no angle rates",
+            f"the Euler angles {sequence} are at their representational singularity, or too near to it: "
+            "at the singularity, some angular velocities correspond to no angle rates",
             where=f"sample {list(sample)}" if sample else None,
             found=f"a middle angle {distance:.3g} rad from it",
             remedy="describe the orientation by another sequence or by a quaternion",

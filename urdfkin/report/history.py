@@ -32,7 +32,7 @@ from urdfkin.report.words import (
 )
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, as_json_data, doc, parse_json
 from urdfkin.system.files import MAX_BYTES, is_folder, read_bytes, shorten_path
-from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
+from urdfkin.validation.document import OUTCOMES, VALIDATION, BoundRatio, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports, and of files in a folder.
@@ -65,7 +65,7 @@ class ValidationRun(TypedDict):
     robots: Annotated[Count, doc("Number of robots.")]
     results: Annotated[Count, doc("Number of compared results.")]
     failed: Annotated[Count, doc("Number of results outside their bound.")]
-    bound_ratio: Units
+    bound_ratio: BoundRatio
     versions: Annotated[dict[str, str], doc("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
         list[ChangeEntry], doc("Changes since the previous run, as `urdfkin report compare` lists them.")
@@ -84,10 +84,7 @@ class Point(TypedDict):
     results: Annotated[Count, doc("Number of compared results.")]
     failed: Annotated[Count, doc("Number of results outside their bound.")]
     worst: Units
-    bound_ratio: Annotated[
-        float | None,
-        doc("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
-    ]
+    bound_ratio: BoundRatio
     errors: Annotated[Count, doc("Number of errors in the file.")]
     warnings: Annotated[Count, doc("Number of warnings in the file.")]
     notes: Annotated[Count, doc("Number of notes on the file.")]
@@ -113,7 +110,9 @@ class HistoryDocument(Header):
     runs: Annotated[list[ValidationRun], doc("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], doc("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], doc("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], doc("Files whose validation run is already in another file.")]
+    repeated: Annotated[
+        list[Unused], doc("Files that are left out, because another file has the same validation run.")
+    ]
 
 
 HISTORY = DocumentKind(

@@ -122,7 +122,10 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
     for joint in model["joints"]:
         owner = joint["mimic"]["mimicked_joint"] if joint["mimic"] else joint["name"]
         if places.get(owner) != (joint["q"], joint["v"]):
-            yield f"`model`: joint {joint['name']}: wrong index in q or v"
+            yield (
+                f"`model`: joint {joint['name']}: wrong index in q or v: `q` is {joint['q']}, and `v` is"
+                f" {joint['v']}"
+            )
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):
         yield (
             "`model`: `nq`, `nv`, `coordinates` or `rates` is wrong:"
@@ -172,7 +175,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
     }
     for name, (value, expected) in sums.items():
         if value != expected:
-            yield f"`{name}` is not {expected}, the sum of the robot's checks"
+            yield f"`{name}` is {value}, but the sum over the robot's checks is {expected}"
     yield from _verdict(robot, document["samples"] + SPECIAL_SAMPLES)
     names = [(check["quantity"], check["reference"]) for check in robot["checks"]]
     if len(set(names)) != len(names):
@@ -191,7 +194,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
         figures = chain["metres"], chain["worst"], chain["bound_ratio"]
         if not chain["samples"] and any(figure is not None for figure in figures):
             ends = f"{chain['base']} to {chain['tip']}"
-            yield f"tables from {ends}: `samples` is 0, but the tables have disagreements"
+            yield f"tables from {ends}: `samples` is 0, but `metres`, `worst` or `bound_ratio` has a value"
 
 
 def _subjects(robot: ReportedRobot) -> dict[str, list[str]]:
@@ -240,19 +243,25 @@ def _check(
             f" {check['subjects']}"
         )
     if len(histogram) != len(edges) + 1 or sum(histogram) != results:
-        yield f"`histogram` does not contain {results} results, or has a wrong number of bins"
+        yield (
+            f"`histogram` has {sum(histogram)} results in {len(histogram)} bins, but must have {results}"
+            f" results in {len(edges) + 1} bins"
+        )
         return
     if len(check["worst_by_subject"]) != len(subjects):
         yield f"`worst_by_subject` must have one entry for each of {len(subjects)} {check['subjects']}"
         return
     if check["worst"] != worst(check["worst_by_subject"]):
         yield (
-            f"`worst` is {check['worst']}, but the worst disagreement of all {check['subjects']} is"
+            f"`worst` is {check['worst']}, but the largest entry of `worst_by_subject` is"
             f" {worst(check['worst_by_subject'])}"
         )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
-        yield f"`worst` is {check['worst']}, but the last bin with results does not contain this value"
+        yield (
+            f"`worst` is {check['worst']}, but the last bin of `histogram` with results does not contain this"
+            " value"
+        )
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
         if not math.isclose(_as_number(stated), computed, rel_tol=_TOLERANCE):
@@ -273,7 +282,10 @@ def _check_bound_ratio(check: ReportedCheck) -> Iterator[str]:
     if low > high:
         # Without results, the first bound is larger than the second.
         if ratio or largest or check["worst_case"]:
-            yield f"`bound` is {check['bound']}, but the check has a disagreement"
+            yield (
+                f"`bound` is {check['bound']}, as in a check without results, but `worst`, `bound_ratio` or"
+                " `worst_case` has a value"
+            )
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
     if not (ends[0] * (1.0 - _TOLERANCE) <= ratio <= ends[1] * (1.0 + _TOLERANCE)):
@@ -284,7 +296,9 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
     case, model = check["worst_case"], robot["model"]
     if case is None:
         if check["worst"] != 0.0 or check["failed"]:
-            yield "`worst_case` is missing, but a result disagrees"
+            yield (
+                f"`worst_case` is missing, but `worst` is {check['worst']}, and `failed` is {check['failed']}"
+            )
         return
     if case["frame"] not in subjects:
         yield f"`worst_case`: {case['frame']} is not one of the compared {check['subjects']}"

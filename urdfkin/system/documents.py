@@ -61,8 +61,8 @@ class Header(TypedDict):
         doc(
             "Command that makes the document again, or null if the command is unknown. If the entry contains "
             "several commands, each command is on a line of its own. All robots of one command have the same "
-            "options. A robot that was given as text is written as `-` (standard input). A command contains "
-            "at most one `-`."
+            "options. A robot that was given as text is written as `-` (standard input). A command reads at "
+            "most one robot from standard input."
         ),
     ]
 

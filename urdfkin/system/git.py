@@ -63,18 +63,25 @@ class CommitFiles:
 def merge_base_files(reference: str, folder: Path) -> CommitFiles:
     """Return the files of the merge base of HEAD and a branch, tag or commit; may raise SourceError."""
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
+    fetch = "in GitHub's actions/checkout set fetch-depth: 0"
     try:
         commit = _text(
             "rev-parse", "--verify", "--quiet", "--end-of-options", f"{reference}^{{commit}}", cwd=root
         )
+    except SourceError:
+        raise SourceError(
+            "git finds no branch, tag or commit with this name",
+            where=reference or repr(reference),
+            remedy=f"correct the name, or fetch the commit first; {fetch}",
+        ) from None
+    try:
         merge_base = _text("merge-base", commit, "HEAD", cwd=root)
     except SourceError as error:
         raise SourceError(
             "git finds no common ancestor of this commit and HEAD",
             where=reference,
             found=error.found,
-            remedy="fetch this commit first, with its history; in GitHub's actions/checkout set"
-            " fetch-depth: 0",
+            remedy=f"fetch the history of both commits first; {fetch}",
         ) from None
     rows = _git("ls-tree", "-r", "-z", "--full-tree", merge_base, cwd=root).split(b"\0")
     parts = (row.partition(b"\t") for row in rows if row)

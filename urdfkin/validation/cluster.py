@@ -73,7 +73,7 @@ def connect_cluster(scheduler: str, tell: Callable[[str], None] = lambda _: None
         _check_versions(client)
         threads = client.nthreads()
         dashboard = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
-        tell(f"{len(threads)} workers{dashboard}")
+        tell(f"{len(threads)} worker{'' if len(threads) == 1 else 's'}{dashboard}")
         address = str(getattr(client.scheduler, "address", scheduler))
         if not scheduler.startswith("local:") and not address.startswith("tls://"):
             tell(
@@ -107,7 +107,7 @@ def _client(scheduler: str) -> Iterator[Client]:
         )
     if not number.isdecimal() or not int(number):
         raise InputError(
-            "`scheduler`: N in local:N must be the number of workers",
+            "`scheduler`: N in local:N must be a whole number, at least 1",
             found=repr(scheduler),
             remedy="give local:2",
         )

@@ -215,7 +215,8 @@ def _outside(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
     if found is not None and found.urdfkin.failed:
         ours, theirs, second_oracle = found.alone
         title = ORACLES[found.by].title
+        words = "result of urdfkin disagrees" if found.urdfkin.failed == 1 else "results of urdfkin disagree"
         yield (
-            f"{found.urdfkin.failed:,} results disagree with {title}'s: urdfkin differs from the two others"
-            f" in {ours:,}, Pinocchio in {theirs:,}, {title} in {second_oracle:,}"
+            f"{found.urdfkin.failed:,} {words} with {title} (results in which only one library differs from"
+            f" the two others: urdfkin {ours:,}, Pinocchio {theirs:,}, {title} {second_oracle:,})"
         )

@@ -72,7 +72,13 @@ class ReportedJoint(TypedDict):
             " null: none."
         ),
     ]
-    v: Annotated[int | None, doc("Index of the joint's first entry in v and in a; null: none.")]
+    v: Annotated[
+        int | None,
+        doc(
+            "Index of the joint's first entry in v and in a; for a mimic joint, index of the mimicked joint."
+            " null: none."
+        ),
+    ]
     limit: Annotated[ReportedLimit | None, doc("The joint's limits; null: the joint has no limits.")]
     mimic: Annotated[ReportedMimic | None, doc("The rule of a mimic joint; null for other joints.")]
     remaining_range: Annotated[
@@ -108,7 +114,9 @@ class ReportedModel(TypedDict):
     tip: Annotated[str, doc("Name of the default tip frame of chains.")]
     coordinates: Annotated[list[str], doc("Name of each coordinate in q.")]
     rates: Annotated[list[str], doc("Name of each entry of v and a.")]
-    frames: Annotated[list[str], doc("Names of all links and joints, as in Pinocchio.")]
+    frames: Annotated[
+        list[str], doc("Names of all frames (links and joints) in Pinocchio's order, each name once.")
+    ]
     links: Annotated[list[str], doc("Names of all links; links[i + 1] is the child of joints[i].")]
     joints: Annotated[list[ReportedJoint], doc("All joints; a parent link comes before its child links.")]
 
@@ -122,13 +130,16 @@ class ReportedFinding(TypedDict):
         doc("Severity of the finding. A file with an error is not compared with Pinocchio."),
     ]
     message: Annotated[str, doc("Description of the problem.")]
-    found: Annotated[str | None, doc("Text in the file that causes the problem; null: none.")]
+    found: Annotated[str | None, doc("What was found, usually the wrong text in the file; null: none.")]
     remedy: Annotated[str | None, doc("How to correct the file; null: no remedy is known.")]
     file: Annotated[str, doc("Name of the file with the problem.")]
     line: Annotated[Count, doc("Line number of the problem, counted from 1.")]
     column: Annotated[Count, doc("Column number of the problem, counted from 1.")]
-    element: Annotated[str | None, doc("Tag of the XML element with the problem; null: none.")]
-    name: Annotated[str | None, doc("Name of the link or joint with the problem; null: none.")]
+    element: Annotated[
+        str | None,
+        doc("Tag of the joint, link or other child of <robot> with the problem; null: the whole file."),
+    ]
+    name: Annotated[str | None, doc("Name of the joint, link or material with the problem; null: none.")]
     pinocchio_reading: Annotated[
         Literal["refuses", "differs"] | None,
         doc("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
@@ -190,14 +201,15 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         doc(
-            "Largest disagreement of the tip's placement, Jacobian and acceleration, in eps * scale. The"
-            " entry covers both tables. null: a result is NaN, or there is no comparison."
+            "Largest disagreement of the tip's placement, Jacobian and acceleration of both tables, in eps"
+            " * scale. null: a result is NaN, two values with the bound 0 differ, or there is no comparison."
         ),
     ]
     bound_ratio: Annotated[
         float | None,
         doc(
-            "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
+            "Largest ratio of a disagreement to its bound. null: a result is NaN, two values with the bound"
+            " 0 differ, or there is no comparison."
         ),
     ]
 
@@ -241,7 +253,13 @@ class Case(TypedDict):
     sample: Annotated[
         Count, doc("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
     ]
-    frame: Annotated[str, doc("Name of the frame: link:NAME or joint:NAME.")]
+    frame: Annotated[
+        str,
+        doc(
+            "The frame (link:NAME or joint:NAME), the joint or the column of the disagreement, as `subjects`"
+            " of the check states."
+        ),
+    ]
     disagreement: Units
     q: Annotated[list[float], doc("Configuration of the sample.")]
     v: Annotated[list[float], doc("Joint velocities of the sample.")]
@@ -278,8 +296,8 @@ class SecondOracle(TypedDict):
     undecided: Annotated[
         Count,
         doc(
-            "Number of results that do not show which library is wrong: either no two libraries agree, or one"
-            " library agrees with both others, but these two disagree."
+            "Number of results that do not show which library is wrong. Either no two of the three libraries"
+            " agree, or one library agrees with the two others, and these two disagree."
         ),
     ]
 
@@ -358,14 +376,14 @@ class ReportedRobot(TypedDict):
     """Report of one robot."""
 
     source: Annotated[str, doc("A path, a catalogue name, - for standard input, or <text>.")]
-    name: Annotated[str, doc("The robot's name in the URDF.")]
+    name: Annotated[str, doc("The robot's name in its file; the source if the file could not be read.")]
     verdict: Annotated[
         Literal["verified", "disagrees", "not verified", "bad input"], doc("Verdict on the robot.")
     ]
     reason: Annotated[str | None, doc("Reason why the robot is not verified; null if it is verified.")]
     error: Annotated[str | None, doc("Traceback of an unexpected error; null: no such error.")]
     joints: Annotated[list[str], doc("Names of the moving joints, mimic joints included.")]
-    frames: Annotated[list[str], doc("Names of the compared links and joints.")]
+    frames: Annotated[list[str], doc("Names of the compared frames: link:NAME or joint:NAME.")]
     samples: Annotated[Count, doc("Number of compared configurations, including the three special ones.")]
     results: Annotated[Count, doc("Number of results compared with Pinocchio.")]
     failed: Annotated[Count, doc("Number of results with a disagreement above the bound.")]
@@ -384,7 +402,7 @@ class ReportedRobot(TypedDict):
         list[ReportedCheck], doc("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
     accuracy: Annotated[
-        ReportedAccuracy | None, doc("Result of the accuracy study; null without `--accuracy`.")
+        ReportedAccuracy | None, doc("Result of the accuracy study; null without `--accuracy` or a result.")
     ]
 
 
@@ -399,8 +417,8 @@ class Document(Header):
     seconds: Annotated[
         float,
         doc(
-            "Wall time of the validation in seconds. In a report from a folder of stored results, the"
-            " entry is the sum of the robots' computing times."
+            "Wall time of the validation in seconds. In a report that `urdfkin report DIR` makes from a"
+            " store: the sum of the robots' computing times."
         ),
     ]
     seed: Annotated[int, doc("Seed of the random samples.")]

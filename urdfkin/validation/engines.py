@@ -89,7 +89,7 @@ class ExecutorEngine:
         try:
             submitted.append((task, self._executor.submit(answer_chunk, task.chunk)))
         except Exception as error:
-            return make_lost_failure("the executor did not accept the chunk", error)
+            return make_lost_failure("the executor did not accept the task of checking the chunk", error)
         return None
 
 

@@ -202,7 +202,8 @@ class FunctionCheck(Displayable):
                 " difference."
             )
         if self.errors:
-            parts.append(f"{self.errors} configurations without a usable result; the first ones:")
+            configurations = "configuration" if self.errors == 1 else "configurations"
+            parts.append(f"{self.errors} {configurations} without a usable result; the first ones:")
             parts += self._list_first_errors()
         if not self.agrees:
             parts += [f"Diagnosis: {words}." for words in self.diagnoses]
@@ -311,10 +312,18 @@ def verify_function(
     True
     """
     if not callable(function):
-        raise InputError("the function to check must be callable", found=safe_repr(function))
+        raise InputError(
+            "the function to check must be callable",
+            found=safe_repr(function),
+            remedy="give a function that takes q, or q, v and a",
+        )
     row = quantity_of(quantity)
     if row.object_kind != "frames" or row is ACCELERATION_BREAKDOWN:
-        raise InputError("urdfkin cannot check functions that compute this quantity", found=quantity)
+        raise InputError(
+            "urdfkin cannot check functions that compute this quantity",
+            found=quantity,
+            remedy="give the name of a quantity of one frame, such as placement or jacobian",
+        )
     run = _Run(
         function,
         robot,
@@ -579,7 +588,7 @@ class _Run:
         if (first_batch := total.first_batch) is None:
             return
         if total.not_finite:
-            yield f"{total.not_finite} results are not finite"
+            yield f"{total.not_finite} {'result is' if total.not_finite == 1 else 'results are'} not finite"
             return
         if total.bound_ratio <= 1.0:  # All differences are within their bounds.
             return

@@ -92,7 +92,7 @@ class Program:
         if not command:
             raise InputError("a program needs a command")
         if not 0.0 < timeout <= _DAY:
-            raise InputError("the timeout must be positive, and at most a day", found=repr(timeout))
+            raise InputError(f"the timeout must be above 0 and at most {_DAY:g} seconds", found=repr(timeout))
         self.command, self.timeout = list(command), timeout
         self.__name__ = Path(command[0]).name
         names = robot if convention is None else robot.convention(convention)

@@ -173,6 +173,13 @@ class Store:
     def open_read_only(cls, folder: Path, notify: Notify) -> Store:
         """Return a read-only store; another process may write to its folder."""
         path = folder / _MANIFEST
+        if not os.path.lexists(path):
+            raise SourceError(
+                "this is not a folder with results of a validation",
+                where=str(folder),
+                found=f"no file {_MANIFEST}",
+                remedy="give the folder of `urdfkin validate --store DIR`",
+            )
         return cls(folder, Manifest.from_json(read_bytes(path), str(path)), notify)
 
     def read_answer(self, robot: int, index: int) -> Answer | None:
@@ -246,20 +253,34 @@ class Store:
 
     def check_same_campaign(self, manifest: Manifest, where: object = None) -> None:
         if differences := self.manifest.differences(manifest):
-            there = "here" if where is None else f"in {where}"
+            there, remedy = (
+                "here",
+                "use the options, robot files and versions of this campaign, or another folder",
+            )
+            if any(difference.startswith("robot ") for difference in differences):
+                remedy += "; with --retry failed, the file of a failed robot may differ"
+            if where is not None:
+                there, remedy = f"in {where}", "merge only stores of one validation"
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
                 found=f"(in the store, and {there}) {'; '.join(differences)}",
-                remedy="use the options of the stored campaign, or another folder",
+                remedy=remedy,
             )
 
     def writing_process(self) -> str | None:
-        try:
-            with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
-                return None if _try_lock(file, fcntl.LOCK_SH) else _read_holder(file)
-        except OSError:
-            return None
+        """Return a process that writes to the store; None if there is no such process.
+
+        The processes of a sharded validation share the store's lock, and each process locks its own file.
+        """
+        for path in (self.folder / _LOCK, *sorted(self.folder.glob(f"{_LOCK}-*"))):
+            try:
+                with _lock_file(path, os.O_RDONLY) as file:
+                    if not _try_lock(file, fcntl.LOCK_SH):
+                        return _read_holder(file)
+            except OSError:
+                continue
+        return None
 
     def write(self, name: str, data: bytes) -> None:
         self._write(self.folder / name, data)
@@ -294,8 +315,13 @@ class Store:
                 "the store cannot be written",
                 where=str(self.folder),
                 found=error.strerror or str(error),
-                remedy="free some disk space and repeat the same command; finished chunks are kept",
+                remedy=f"{_remedy(error)}, and repeat the same command; finished chunks are kept",
             ) from error
+
+
+def _remedy(error: OSError) -> str:
+    is_full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return "free some disk space" if is_full else "correct the folder or its permissions"
 
 
 @contextlib.contextmanager
