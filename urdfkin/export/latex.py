@@ -39,7 +39,7 @@ _RESULTS = {
 
 
 def write(code: FrameCode, to: str = "latex") -> str:
-    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # The document contains no test vectors.
+    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has none.
     joints, coordinates, rates = (
         enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
     )
