@@ -186,7 +186,7 @@ def format_studies(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     inputs = f"{SAMPLES} samples of each robot (seed 0) and every link, with Pinocchio {version()}"
     counts = f"""The study used {inputs}.
-Each line of the tables below compares the typical errors of both libraries:
+Each line of the tables below compares the typical errors of urdfkin and Pinocchio:
 {more_accurate_counts(lines)}. Equal errors are
 the same double. The median ratio of urdfkin's typical error to Pinocchio's is
 {median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""

@@ -48,7 +48,10 @@ def test_an_implausible_calibration_is_written_only_with_force(tmp_path: Path) -
     data = urdfkin(*words, "--format", "json").data
     assert data["likeliest_reason"].startswith("q is shifted by one row")
     assert "of the reach" in data["objections"][0]
-    assert "urdfkin: warning: " in good(*words, "--force", "-o", str(out)).err
+    warning = good(*words, "--force", "-o", str(out)).err
+    assert "urdfkin: warning: " in warning
+    assert "refused" not in warning
+    assert "--force" not in warning
     assert out.exists()
 
 

@@ -230,3 +230,9 @@ def test_braces_and_environments_of_a_latex_document_are_closed() -> None:
     document = write(code(urdfkin.load("planar_two_link")), "latex")
     assert document.count(r"\begin{") == document.count(r"\end{")
     assert document.replace(r"\{", "").count("{") == document.replace(r"\}", "").count("}")
+
+
+def test_a_latex_document_does_not_claim_to_contain_test_vectors() -> None:
+    document = write(code(urdfkin.load("planar_two_link")), "latex")
+    assert "% Written by urdfkin" in document
+    assert "test vectors" not in document

@@ -17,15 +17,17 @@ from flint import arb
 
 import urdfkin
 from tests import urdfs
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.export.writing import ALL, built, code, file, module, need, ran
 from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
 from tests.reading import module_of
 from tests.urdfs import joint, limit, mimic
+from urdfkin.cli.export import _LANGUAGES_OF_SUFFIXES
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
-from urdfkin.export.check import check
+from urdfkin.export.check import _COMPILE, check
 from urdfkin.export.proof import format_decimal
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.reference import Reference
@@ -560,6 +562,16 @@ def test_the_check_refuses_a_file_that_urdfkin_export_did_not_write(tmp_path: Pa
     broken.write_text(mine.read_text("utf-8").replace("def check", "def ("), "utf-8")
     with pytest.raises(InputError, match="the file does not run"):
         check(broken)
+
+
+@pytest.mark.slow
+def test_the_check_accepts_each_suffix_that_selects_a_compiled_language(tmp_path: Path) -> None:
+    suffixes = {suffix for suffix, to in _LANGUAGES_OF_SUFFIXES.items() if to in ("cpp", "cuda")}
+    assert suffixes | {".c"} == set(_COMPILE)
+    for suffix in (".cc", ".cu"):
+        path = tmp_path / f"arm{suffix}"
+        good("export", "planar_two_link", "--quantity", "placement", "-o", str(path))
+        assert check(path).verified
 
 
 def test_an_invalid_export_is_refused_with_the_valid_choices() -> None:

@@ -211,14 +211,15 @@ class ImplausibleError(InputError):
         calibration: The refused calibration.
     """
 
-    def __init__(self, calibration: Calibration, remedy: str) -> None:
+    def __init__(self, calibration: Calibration, remedy: str | None) -> None:
+        """Without `remedy`, the message does not state that the calibration was refused."""
         model, plausibility = calibration.model, calibration.plausibility
         reason = f"likeliest reason: {plausibility.reason}" if plausibility.reason else _NO_REASON
         super().__init__(
-            "the calibration is not plausible and was refused",
+            "the calibration is not plausible" + (" and was refused" if remedy else ""),
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
             found="; ".join(plausibility.objections),
-            remedy=f"{reason}; {remedy}",
+            remedy=f"{reason}; {remedy}" if remedy else reason,
         )
         self.calibration = calibration
 

@@ -154,7 +154,8 @@ def calibrate_command(
         answer()
     if calibration is not None and calibration.plausibility.objections:
         is_refused = calibration.plausibility.is_in_degrees or not context.params["force"]
-        say(f"urdfkin: {'error' if is_refused else 'warning'}: {_implausible(calibration)}", err=True)
+        word = "error" if is_refused else "warning"
+        say(f"urdfkin: {word}: {_implausible(calibration, is_refused)}", err=True)
         if is_refused:
             answer(code=3)
     if written.origins:
@@ -170,9 +171,11 @@ def calibrate_command(
     answer(format_check_line(certificate), certificate_exit_code(certificate))
 
 
-def _implausible(calibration: Calibration) -> ImplausibleError:
+def _implausible(calibration: Calibration, is_refused: bool) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError
 
+    if not is_refused:
+        return ImplausibleError(calibration, None)
     if calibration.plausibility.is_in_degrees:
         return ImplausibleError(calibration, "if these values are radians, add --radians")
     return ImplausibleError(calibration, "to write this calibration anyway, add --force")

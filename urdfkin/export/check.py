@@ -32,13 +32,16 @@ _SEAL_LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+_CUDA_SUFFIXES = (".cuh", ".cu")
 #: Compiler and options for each suffix.
 _COMPILE = {
     ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
-    ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
-    ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
+    **dict.fromkeys(
+        (".hpp", ".hh", ".hxx", ".cpp", ".cc", ".cxx", *_CUDA_SUFFIXES),
+        ("c++", "-std=c++11", "-x", "c++", *_STRICT),
+    ),
 }
-#: Compiler and options for `.cuh` if the computer has nvcc and a GPU.
+#: Compiler and options for CUDA if the computer has nvcc and a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
 #: Number of characters at the start of a file that are searched for `EXPORT_MARK` and the word UNVERIFIED.
 _HEADER_LENGTH = 2000
@@ -128,7 +131,7 @@ def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """
     name = _find_program_name(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
-    command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
+    command = _COMPILE_FOR_GPU if file.suffix in _CUDA_SUFFIXES and _has_gpu() else _COMPILE[file.suffix]
     compiler = _find_program(command[0], file)
     for real in ("double", "float"):
         macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -38,6 +39,7 @@ _RESULTS = {
 
 
 def write(code: FrameCode, to: str = "latex") -> str:
+    code = replace(code, maybe_proof=replace(code.proof, vectors=()))  # A LaTeX document has none.
     joints, coordinates, rates = (
         enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
     )

@@ -110,9 +110,13 @@ class Proof:
             *self._single_lines,
             f"URDF sha256 {self.sha256}",
             *(f"Joint {comment_name(name)} is locked at {value!r}" for name, value in self.lock),
-            f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
+            f"Written by urdfkin {self.urdfkin}{self._vectors_text}",
             *([self.constants] if self.constants else []),
         ]
+
+    @property
+    def _vectors_text(self) -> str:
+        return f"; {len(self.vectors)} test vectors at {DIGITS} digits below" if self.vectors else ""
 
     @property
     def _single_lines(self) -> list[str]:
