@@ -163,7 +163,7 @@ def test_a_difference_within_the_last_digit_is_distinguished_from_a_larger_one(
 
 def test_the_dh_command_marks_rounded_cells_and_has_the_option_no_fit(tmp_path: Path) -> None:
     done = command("dh kinova --compare kinova")
-    assert "All differences are within the last digit of the table (*)." in done.text
+    assert "The difference is within the last digit of the table (*)." in done.text
     data = command("dh kinova --compare kinova --format json").data
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
     file = tmp_path / "wrong.toml"

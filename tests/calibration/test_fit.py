@@ -153,8 +153,9 @@ def test_outliers_are_reported_and_excluded_only_on_request() -> None:
 def test_a_fit_without_redundant_measurements_is_refused() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=5)
     T = true.noisy(1e-4, 1e-4, 0)
-    with pytest.raises(InputError, match="the fit cannot be checked"):
+    with pytest.raises(InputError, match="the fit cannot be checked") as caught:
         true.calibrate(T)
+    assert "likeliest reason: too few different configurations; measure poses at" in str(caught.value)
     found = true.calibrate(T, force=True)
     assert found.identification.rank == 30
     assert found.written_parameters == ()

@@ -123,7 +123,7 @@ def test_prismatic_joints_in_millimetres_are_identified_as_the_mistake() -> None
     name = "through the trunk"
     slides = [joint == "two" for joint in arm(name).robot.coordinate_names]
     said = reason(name, np.where(slides, 1e3 * arm(name).q, arm(name).q))
-    assert said.startswith("prismatic joints are in mill")
+    assert said.startswith("values of prismatic joints are in mill")
 
 
 def test_data_for_a_table_are_checked_like_data_for_a_robot() -> None:

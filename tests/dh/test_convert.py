@@ -191,7 +191,7 @@ def test_a_urdf_that_differs_from_the_table_is_refused(monkeypatch: pytest.Monke
 
 
 def test_a_table_takes_no_xacro_arguments() -> None:
-    with pytest.raises(InputError, match="`xacro_args` is only for"):
+    with pytest.raises(InputError, match=r"`xacro_args` \(--xacro-arg\) is only for"):
         load(read_table(UR5), xacro_args={"arm": "left"})
 
 

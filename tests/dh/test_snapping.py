@@ -177,6 +177,10 @@ def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without
     condition = f"joints without limits travel at most {ASSUMED_LIMIT:g} m"
     assert condition in " ".join(endless.split())
     assert condition not in " ".join(limited.split())
+    if form not in ("json", "toml"):
+        within = "prismatic joints are within their limits"
+        assert within in " ".join(endless.replace("#", "").split())
+        assert within in " ".join(limited.replace("#", "").split())
 
 
 def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_without_limits() -> None:

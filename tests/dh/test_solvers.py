@@ -190,6 +190,13 @@ def test_the_opw_parameters_of_a_random_arm_are_identified(seed: int) -> None:
     assert min(found.lengths[name] for name in ("c1", "c2", "c3")) >= 0.0
 
 
+def test_six_joints_with_a_prismatic_joint_are_not_an_opw_arm() -> None:
+    rows: list[list[object]] = [[*row, "P" if i == 2 else "R"] for i, row in enumerate(PUMA)]
+    path = load(table_from_rows(rows, "modified"), verify=False)
+    with pytest.raises(InputError, match="six revolute joints, RRRRRR: found RRPRRR"):
+        find_opw(path.chain(path.tip_frame, path.base_frame))
+
+
 @pytest.mark.slow
 def test_a_calibrated_arm_is_an_opw_arm_only_within_a_tolerance() -> None:
     lengths = dict(zip(NAMES, (0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))

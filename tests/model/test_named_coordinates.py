@@ -258,7 +258,7 @@ def test_labels_0_1_2_mean_the_order_of_the_coordinates(arm: Robot) -> None:
     [
         (Labelled([1.25, 0.1, -0.5], [2, 0, 1]), "the name of a coordinate must be text: found 2"),
         (Labelled([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label occurs twice: found 'lift'"),
-        ([Labelled([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of tables with labels"),
+        ([Labelled([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of labelled objects"),
     ],
     ids=["numbers in another order", "a label twice", "a list of them"],
 )

@@ -298,6 +298,10 @@ def test_from_pinocchio_refuses_an_invalid_cosine_and_sine(everything: Kinematic
     there[at : at + 2] *= 1.0 + 2e-6
     with pytest.raises(InputError, match="must have norm 1"):
         from_pinocchio(everything, there, mimic=True)
+    there[at : at + 2] *= 0.5  # The message names this norm, not the correct norm of another configuration.
+    right = to_pinocchio(everything, np.array([0.2, 0.5, -0.5, 1.0]), mimic=True)
+    with pytest.raises(InputError, match=r"found 0\.500001"):
+        from_pinocchio(everything, np.array([right, there]), mimic=True)
 
 
 @pytest.mark.parametrize("length", [5, 7, 9])

@@ -48,6 +48,17 @@ def test_at_most_one_byte_more_than_the_limit_is_read(
     assert MAX_BYTES == 100_000_000
 
 
+def test_a_folder_that_cannot_be_listed_is_not_called_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: Path) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(SourceError, match=f"no such file; the folder {tmp_path} cannot be read"):
+        read_source(tmp_path / "arm.urdf")
+
+
 def test_standard_input_is_read_completely_without_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"0.1,0.2\n0.3,0.4\n")))
     assert read_standard_input() == b"0.1,0.2\n0.3,0.4\n"

@@ -289,6 +289,23 @@ def test_a_mimic_rule_between_an_angle_and_a_length_is_not_scaled_and_is_reporte
     assert (mimic.mimicked_joint, mimic.multiplier) == ("shoulder", 0.5)
 
 
+@pytest.mark.parametrize(
+    ("kind", "words", "message"),
+    [
+        ("Prismatic", FOLLOWS.format("tool"), "this joint mimics itself"),
+        ("Fixed", FOLLOWS.format("shoulder"), "a fixed joint cannot mimic another joint"),
+        ("Prismatic", "", "the mimic rule of this joint names no mimicked joint"),
+        ("Prismatic", FOLLOWS.format("none"), "this joint mimics /arm/none, which is not a joint with one"),
+    ],
+)
+def test_a_useless_mimic_rule_is_reported_with_its_reason(
+    read: Read, kind: str, words: str, message: str
+) -> None:
+    tool = joint("tool", kind, "lower", "tip", words, NEWTON)
+    robot = read(ARM + body("tip", "(0, 0, 1)") + tool)
+    assert [text for text in findings(robot) if message in text], findings(robot)
+
+
 def test_value_clips_are_refused_before_their_files_are_read(write: Write) -> None:
     secret = write("#usda 1.0\nTOPSECRET", "secret.usda")
     clips = (
@@ -300,6 +317,7 @@ def test_value_clips_are_refused_before_their_files_are_read(write: Write) -> No
     with pytest.raises(urdfkin.UrdfkinError, match="value clips") as caught:
         loaded(write(stage((ARM).replace(head, head + clips))))
     assert "TOPSECRET" not in str(caught.value)
+    assert str(caught.value).endswith("; flatten the stage: usdcat --flatten")  # A copy does not help.
 
 
 def test_the_joint_to_the_world_may_be_the_articulation_root_as_in_isaac_sim(read: Read) -> None:

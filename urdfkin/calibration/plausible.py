@@ -83,6 +83,8 @@ _MAX_FITS = 4
 #: The number k means that row i + k of q belongs to pose i.
 _SHIFTS = (1, -1, 2, -2)
 _join_names = partial(join_names, limit=4)
+#: With too few configurations, urdfkin does not search for a correction of the data.
+_TOO_FEW = "too few different configurations; measure poses at more configurations"
 
 
 @dataclass(frozen=True)
@@ -235,7 +237,7 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
             fit, (_NOT_WORSE if objections or zeros else _BETTER) * fit.residual_deviation(fit.reach)
         )
     if better is None:
-        return Plausibility(tuple(objections), is_in_degrees=in_degrees)
+        return Plausibility(tuple(objections), _TOO_FEW if few else None, in_degrees)
     if not objections:
         half = f"the zero position changed by half a turn: joint {_join_names(zeros)}; " if zeros else ""
         objections = [
@@ -306,7 +308,8 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
                 "all joint values are multiplied by 180/pi; divide them by 180/pi", np.radians(q)
             )
         yield _Correction(
-            "prismatic joints are in millimetres; convert them to metres", np.where(is_angle, q, 1e-3 * q)
+            "values of prismatic joints are in millimetres; convert them to metres",
+            np.where(is_angle, q, 1e-3 * q),
         )
     for by in _SHIFTS:
         if len(q) > abs(by) + 1:

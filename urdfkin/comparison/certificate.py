@@ -46,7 +46,9 @@ class CertifiedModel(TypedDict):
     """Name and source of a model."""
 
     name: Annotated[str, doc("Name of the robot.")]
-    source: Annotated[str, doc("Path, catalogue name, - for standard input, or <text>.")]
+    source: Annotated[
+        str, doc("Path, catalogue name, - for standard input, or a label such as <text> or <bytes>.")
+    ]
 
 
 class CertifiedRule(TypedDict):

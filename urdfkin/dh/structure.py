@@ -348,7 +348,9 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
-        raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
+        letters = "".join("R" if joint.kind.turns else "P" for joint in path.joints)
+        message = "an OPW arm must have six revolute joints, RRRRRR"
+        raise InputError(message, where=where, found=letters or "no joints")
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), OPW_SAMPLES)
     expected, best, reason = free.placement(q), None, ""
@@ -372,7 +374,8 @@ def find_opw(path: FrameChain, tolerance: float = OPW_TOLERANCE) -> OpwParameter
             "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
             found=reason,
-            remedy="run `urdfkin structure` to see the properties of the arm, or allow a larger tolerance",
+            remedy="run `urdfkin structure` to see the properties of the arm, or allow a larger"
+            " tolerance (--opw MM)",
         )
     return best[1]
 

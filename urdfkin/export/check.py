@@ -95,7 +95,7 @@ def check(file: Path) -> FileCheck:
     runs = {**dict.fromkeys(_COMPILE, _run_compiled), ".py": _run_imported, ".m": _run_octave}
     if (run := runs.get(file.suffix)) is None:
         raise InputError(
-            "a file of this kind cannot be run",
+            "urdfkin cannot run an exported file of this kind",
             where=str(file),
             found=file.suffix or "no suffix",
             remedy=f"check a file with the suffix {', '.join(runs)}",

@@ -300,9 +300,11 @@ def integrate_orientation(
     """
     times = as_finite(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
-        raise InputError(
-            "times must be a one-dimensional array of increasing numbers", found=str(times.shape)
-        )
+        found = f"shape {times.shape}"
+        if times.ndim == 1:
+            k = int(np.argmax(np.diff(times) <= 0.0))
+            found = f"{times[k]:g}, then {times[k + 1]:g}"
+        raise InputError("times must be a one-dimensional array of increasing numbers", found=found)
     quats = [normalise_quaternions(quat)]
     for start, end in pairwise(times.tolist()):
         quats.append(_step(w, quats[-1], start, end, frame))

@@ -586,7 +586,7 @@ def _angle_of_pair(joint: Joint, values: FloatArray) -> FloatArray:
         raise InputError(
             "(cos, sin) must have norm 1",
             where=f"joint {joint.name}",
-            found=f"{norm.max():.9g}",
+            found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
             question=QuestionsSection.CONTINUOUS_JOINTS,
         )
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)

@@ -223,10 +223,11 @@ def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[st
     if isinstance(value, list | tuple):
         if any(_labels(item) for item in value):
             raise InputError(
-                "a list of tables with labels is not accepted",
+                "a list of labelled objects, such as dicts or rows of pandas, is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one table, or numbers without names in the order of the coordinates",
+                remedy="give one mapping or table from names to values, or numbers in the order of the"
+                " coordinates",
             )
         return None
     labels = _labels(value)

@@ -327,7 +327,9 @@ def _load_model(
 
 def _reject_xacro_args(xacro_args: Mapping[str, object] | None, source_kind: str) -> None:
     if xacro_args:
-        raise InputError("`xacro_args` is only for robots from a .xacro file", found=source_kind)
+        raise InputError(
+            "`xacro_args` (--xacro-arg) is only for robots from a .xacro file", found=source_kind
+        )
 
 
 def make_robot(

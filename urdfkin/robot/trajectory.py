@@ -203,7 +203,7 @@ def make_line_trajectory(
     samples = as_int(samples, "samples", 0)
     if duration <= 0.0 or samples < _MIN_SAMPLES:
         raise InputError(
-            f"a line needs a duration above 0 and at least {_MIN_SAMPLES} samples",
+            f"a line trajectory needs a duration above 0 s and at least {_MIN_SAMPLES} samples",
             found=f"{duration} s, {samples}",
         )
     q_0, q_1 = parse_finite(robot.tree, start, "q"), parse_finite(robot.tree, end, "q")

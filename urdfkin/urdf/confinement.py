@@ -143,7 +143,8 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. A xacro"
                 " file may read its own folder, package and repository. Also allowed are the folders on"
                 " ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and the files and folders that an argument names."
-                " In the folders above the xacro file, package.xml and packages named in $(find) are allowed"
+                " A package.xml in a folder above the xacro file, and the packages that $(find) finds, are"
+                " also allowed"
             )
 
     sys.addaudithook(refuse_forbidden)

@@ -501,10 +501,13 @@ class _MjcfReader:
             raise InputError(message, where=f"{self.source}: joint {name}", remedy=remedy)
         at = int(m.jnt_qposadr[j])
         if kind == kinds.mjJNT_FREE:
-            place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])
-            if m.qpos0[at : at + 3].any() or m.qpos0[at + 3] != 1.0:
+            place, turn = (", ".join(f"{x:g}" for x in part) for part in np.split(m.qpos0[at : at + 7], [3]))
+            is_turned = m.qpos0[at + 3] != 1.0
+            if m.qpos0[at : at + 3].any() or is_turned:
+                turned = f" with the quaternion (w, x, y, z) = ({turn})" if is_turned else ""
                 zero = "in the neutral configuration the body is at the origin"
-                what = f"qpos0 places this body at ({place}); {zero}"
+                zero += ", not turned" if is_turned else ""
+                what = f"qpos0 places this body at ({place}){turned}; {zero}"
                 self.remarks.append(MjcfRemark(what, f"joint {name}"))
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
         reference, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE

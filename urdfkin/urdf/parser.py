@@ -563,7 +563,7 @@ _REMEDIES = (
     (r"[\[({].*|.*[\])}]", "write the numbers without brackets"),
     (r"[+-]?[0-9.]+e[+-]?", "write digits after the e"),
     (r"[+-]?[0-9.]+[a-z]+", "write the number without a unit"),
-    (r"", "the attribute is empty; write a number, or remove the attribute"),
+    (r"", "the attribute is empty; write a number, or remove an optional attribute"),
 )
 
 

@@ -164,7 +164,7 @@ def read_source(
         return _expand_xacro(expand_home(source), xacro_args or {})
     if xacro_args:
         names = ", ".join(map(str, xacro_args))
-        raise InputError("`xacro_args` needs the path of a .xacro file", found=names)
+        raise InputError("`xacro_args` (--xacro-arg) needs the path of a .xacro file", found=names)
     if isinstance(source, bytes):
         return UrdfText(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
@@ -215,7 +215,7 @@ def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> UrdfText:
 
 def _read_string(source: str, max_bytes: int) -> UrdfText:
     if not source.strip():
-        remedy = "a path, a name that 'urdfkin robots' lists, or '-'"
+        remedy = "give a path, a name that 'urdfkin robots' lists, or '-' for standard input"
         raise InputError("the robot's name is empty", found=repr(source), remedy=remedy)
     if source == "-":
         return UrdfText(read_start_of_standard_input(max_bytes + 1), "<stdin>", "-")
@@ -279,7 +279,9 @@ def find_entry(name: str) -> CatalogueEntry | None:
 def _nearest_file(path: Path) -> str:
     try:
         names = [entry.name for entry in path.parent.iterdir()]
-    except OSError:
+    except FileNotFoundError:
         return f"the folder {path.parent} does not exist"
+    except OSError:
+        return f"the folder {path.parent} cannot be read"
     close = find_similar_names(path.name, names)
     return f"did you mean {', '.join(close)}?" if close else "'urdfkin robots' lists robots that need no file"

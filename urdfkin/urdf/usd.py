@@ -249,7 +249,8 @@ def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths
     if written.startswith("`"):
         raise _make_refusal("a reference is an expression", where, written)
     if "://" in written:
-        raise _make_refusal("a reference is a network address, and urdfkin downloads nothing", where, written)
+        what = "a reference is a network address, and urdfkin downloads nothing"
+        raise _make_refusal(what, where, written, can_copy=True)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
@@ -259,14 +260,16 @@ def _resolve_asset(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
     if not allowed_paths.allows(outer):
         what = "a reference leads outside the folder, package and repository of the stage"
-        raise _make_refusal(what, where, written)
+        raise _make_refusal(what, where, written, can_copy=True)
     if Path(inner or outer).suffix.lower() not in USD_SUFFIXES:
         raise _make_refusal("a reference names a file that is not USD", where, written)
     return address if os.path.exists(outer) else None  # noqa: PTH110  Path.exists() can fail
 
 
-def _make_refusal(what: str, where: str, found: str) -> InputError:
-    remedy = "copy the file beside the stage, or flatten the stage: usdcat --flatten"
+def _make_refusal(what: str, where: str, found: str, *, can_copy: bool = False) -> InputError:
+    remedy = "flatten the stage: usdcat --flatten"
+    if can_copy:
+        remedy = f"copy the file into the folder of the stage, and refer to the copy; or {remedy}"
     return InputError(what, where=where, found=found[:200], remedy=remedy)
 
 
@@ -1048,14 +1051,17 @@ class _StageReader:
         for edge in edges:
             for rule in self._read_mimic_rules(edge):
                 mimicked_joint = by_path.get(rule.mimicked_joint)
-                if (
-                    mimicked_joint is None
-                    or mimicked_joint.kind.nq != 1
-                    or edge.kind.nq != 1
-                    or mimicked_joint is edge
-                ):
-                    named = rule.mimicked_joint or "nothing"
-                    what = f"this joint mimics {named}, which is not a joint with one coordinate"
+                if edge.kind.nq != 1:
+                    what = f"a {edge.kind.value} joint cannot mimic another joint"
+                    self._report("lost-mimic", edge.path, what, "remove the rule")
+                elif mimicked_joint is edge:
+                    self._report(
+                        "lost-mimic", edge.path, "this joint mimics itself", "correct the relationship"
+                    )
+                elif mimicked_joint is None or mimicked_joint.kind.nq != 1:
+                    what = "the mimic rule of this joint names no mimicked joint"
+                    if named := rule.mimicked_joint:
+                        what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
                 elif edge.path in rules or depends_on(rules, rule.mimicked_joint, edge.path):
                     what = "this joint has two mimic rules, or mimics itself through other joints"

@@ -115,7 +115,9 @@ class CertificateDocument(Header):
     """A saved certificate as plain data: the checked and the unchecked results of a robot."""
 
     robot: Annotated[str, doc("The robot's name.")]
-    source: Annotated[str, doc("Source of the robot: a path, a catalogue name, or <text>.")]
+    source: Annotated[
+        str, doc("Path, catalogue name, - for standard input, or a label such as <text> or <bytes>.")
+    ]
     source_notes: Annotated[
         str,
         doc(

@@ -212,7 +212,7 @@ def _compare_with_pinocchio(reading: MjcfReading, ours: FloatArray, bound: Bound
     bodies, theirs = [places.index(name) for name in names], _unpack_placements(found["placements"])
     share = _compute_bound_shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
     if (share <= 1.0).all():
-        return "Pinocchio's MJCF reader agrees on the bodies"
+        return "Pinocchio's MJCF reader agrees on the poses of the bodies"
     f = int(share.max(axis=0).argmax())
     off = np.abs(ours[:, bodies[f]] - theirs[:, f])[:, :3]
     return (

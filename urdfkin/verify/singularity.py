@@ -302,7 +302,8 @@ class _Explanation:
         point = np.cross(f, m) / (f @ f)
         return (
             f"Each axis intersects or is parallel to the line along {_format_vector(f / np.linalg.norm(f))}"
-            f" through the point at {_format_vector(point)} m from the origin of {self._columns.frame}."
+            f" through the point at {_format_vector(point)} m from the origin of {self._columns.frame},"
+            " in world axes."
         )
 
     def _describe_null_motion(self, motion: FloatArray) -> str:

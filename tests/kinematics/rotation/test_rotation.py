@@ -249,7 +249,12 @@ REFUSED: dict[str, tuple[Any, Any, str]] = {
         "the same n",
     ),
     "an unknown frame": (quaternion_rate_matrix, ([0, 0, 0, 1], "world"), "'fixed' or 'body'"),
-    "equal times": (integrate_orientation, (np.zeros, [0, 0, 0, 1], [0.0, 0.0]), "increasing"),
+    "equal times": (
+        integrate_orientation,
+        (np.zeros, [0, 0, 0, 1], [0.0, 0.5, 0.5]),
+        "increasing numbers: found 0.5, then",
+    ),
+    "times in two dimensions": (integrate_orientation, (np.zeros, [0, 0, 0, 1], [[0.0]]), r"shape \(1, 1\)"),
     "an unknown sequence": (rotation_from_euler, ("ZYy", [0.0] * 3), "unknown Euler sequence 'ZYy'"),
     "a quaternion of length 2": (
         rotation_from_quaternion,

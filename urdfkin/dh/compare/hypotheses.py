@@ -282,7 +282,7 @@ def find_table_warnings(table: DHTable) -> list[str]:
     angles = [*columns["alpha"], *columns["theta"]]
     if angles and all(looks_round(math.degrees(angle)) for angle in angles):
         warnings.append(
-            "angles of 1.57 degrees look like numbers in radians:"
+            f"angles such as {math.degrees(angles[0]):.3g} degrees look like numbers in radians:"
             " for a table in radians, write angles = 'radians'"
         )
     for length, angle in (("a", "alpha"), ("d", "theta")):

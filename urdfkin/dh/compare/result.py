@@ -390,7 +390,12 @@ def _cell_parts(comparison: TableComparison, units: Units) -> Parts:
                 if rounded == len(comparison.differences)
                 else f"{rounded} of {len(comparison.differences)}"
             )
-            parts.append(f"{count} differences are within the last digit of the table (*).")
+            be = "is" if rounded == 1 else "are"
+            parts.append(
+                "The difference is within the last digit of the table (*)."
+                if len(comparison.differences) == 1
+                else f"{count} differences {be} within the last digit of the table (*)."
+            )
     elif comparison.is_exact_unfitted:
         parts.append("Every cell agrees with the URDF.")
     elif comparison.exact:

@@ -11,11 +11,10 @@ import re
 from fractions import Fraction
 from typing import Any
 
-from urdfkin.dh.export.text import format_cells, formula
+from urdfkin.dh.export.text import format_cells, formula, snap_condition
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.dh.units import COLUMNS, Units, format_pi_fraction, pi_fraction
 from urdfkin.errors import InputError
-from urdfkin.model.configuration import TRAVEL_CONDITION
 from urdfkin.model.tree import FloatArray, is_bounded
 
 
@@ -44,7 +43,7 @@ def header_lines(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        condition = f" if {TRAVEL_CONDITION}" if table.unlimited else ""
+        condition = f" if {holds_if}" if (holds_if := snap_condition(table)) else ""
         lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m{condition}")
     return [sanitize(line) for line in lines]
 

@@ -126,6 +126,14 @@ def format_bound(value: float) -> str:
     return f"{math.ceil(value / unit * _ROUND_UP_FACTOR) * unit:.2e}"
 
 
+def snap_condition(table: DHTable) -> str:
+    """Return the condition under which the bound of the tip's displacement holds, or ""."""
+    condition = "prismatic joints are within their limits"
+    if all(row.kind.turns for row in table.rows):
+        return ""
+    return f"{condition} and {TRAVEL_CONDITION}" if table.unlimited else condition
+
+
 def snap_lines(table: DHTable) -> list[str]:
     snap = table.snap
     if snap is None:
@@ -134,11 +142,7 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = format_bound(snap.metres), format_bound(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
-    condition = ""
-    if any(not row.kind.turns for row in table.rows):
-        condition = "; this holds if prismatic joints are within their limits"
-    if table.unlimited:
-        condition += f" and {TRAVEL_CONDITION}"
+    condition = f"; this holds if {holds_if}" if (holds_if := snap_condition(table)) else ""
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
         f"{radians} rad{condition}",
@@ -149,6 +153,7 @@ def snap_lines(table: DHTable) -> list[str]:
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
         displacement = format_bound(change.tip_displacement)
         effect = f"turned by {change.angle:.2e} rad, tip moves by at most {displacement} m"
+        effect += " with prismatic joints at 0" if change.prismatic_joints else ""
         lines.append(f"  {row}: {change.what}, {effect}")
     return lines
 
@@ -220,7 +225,7 @@ def _caption(table: DHTable) -> str:
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
             f" which moves the tip by at most {latex_math(format_bound(table.snap.metres))}\\,m"
         )
-        caption += f" if {TRAVEL_CONDITION}." if table.unlimited else "."
+        caption += f" if {holds_if}." if (holds_if := snap_condition(table)) else "."
     return caption
 
 

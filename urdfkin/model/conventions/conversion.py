@@ -485,7 +485,7 @@ class Conversion:
                     raise InputError(
                         "the cosine and sine of a joint must have norm 1",
                         where=column.name,
-                        found=f"{norm.max():.6g}",
+                        found=f"{norm.flat[np.abs(norm - 1.0).argmax()]:.9g}",
                     )
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
                 q[..., at] = (angle - column.zero) / column.factor
@@ -555,7 +555,9 @@ class Conversion:
             q = configuration.neutral(self.tree)
         elif q is None:
             raise InputError(
-                "the matrix of a floating or planar joint depends on q", where=self.convention.name
+                "the matrix of a floating or planar joint depends on q",
+                where=self.convention.name,
+                remedy="pass q",
             )
         configurations = configuration.parse_finite(self.tree, q, "q")
         M = np.tile(M, (*configurations.shape[:-1], 1, 1))

@@ -97,6 +97,11 @@ CASES = [
         " at the origin",
     ),
     Mjcf(
+        "a-free-body-that-is-turned", _two(joint='type="free"', body='quat="0 1 0 0"'),
+        "MJCF102 joint b: qpos0 places this body at (0, 0, 0) with the quaternion (w, x, y, z) ="
+        " (0, 1, 0, 0); in the neutral configuration the body is at the origin, not turned",
+    ),
+    Mjcf(
         "shapes-lights-and-motors",
         _two(inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>', more=_MOTOR),
         f"MJCF102 {_USELESS}1 actuator, 2 geoms, 1 camera, 1 light",

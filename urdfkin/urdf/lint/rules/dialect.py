@@ -401,16 +401,22 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
 
 
 def _check_odd_name(report: Reporter, name: str, element: Element) -> None:
+    formula = f"the name begins with {name[0]}, like a spreadsheet formula"
+    long = f"the name has {len(name)} characters"
     reasons = {
         "the name contains characters that cannot be printed": not name.isprintable(),
         "the name begins or ends with a space": name != name.strip(),
         "the name contains a slash, like a path": "/" in name or "\\" in name,
-        "the name begins like a spreadsheet formula": name[0] in "=+-@",
-        f"the name has {len(name)} characters": len(name) > MAX_NAME_LENGTH,
+        formula: name[0] in "=+-@",
+        long: len(name) > MAX_NAME_LENGTH,
         "the name contains a special character of shells or XML": bool(set(name) & set("\"'<>&|;`$")),
     }
     if reason := next((text for text, is_true in reasons.items() if is_true), None):
-        remedy = "use letters, digits, - and _"
+        remedies = {
+            formula: "begin the name with a letter",
+            long: f"use at most {MAX_NAME_LENGTH} characters",
+        }
+        remedy = remedies.get(reason, "use letters, digits, - and _")
         report.add(ODD_NAME, reason, element, attribute="name", found=quote(name), remedy=remedy)
 
 

@@ -692,7 +692,7 @@ def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
         first = places.setdefault(place, joint)
         if first is not joint:
             message = f"the joint has the same origin and axis as joint {quote(first.name)}"
-            remedy = "correct one of the two origins, or ignore this note if both joints are intended"
+            remedy = "correct one of the two joints, or ignore this note if both joints are intended"
             report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
