@@ -34,7 +34,7 @@ from urdfkin.errors.validators import as_finite_float
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, joints_between, make_chain
-from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
+from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
@@ -262,6 +262,14 @@ def find_noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
             if 0.0 < abs(length) <= _MAX_NOISE * table.span:
                 noisy.append((row.joint, name, abs(length)))
     return sorted(noisy, key=lambda cell: cell[2])
+
+
+def travel_condition(table: DHTable) -> str:
+    """Return the condition on the joint values under which a bound on the tip's displacement holds, or ""."""
+    condition = "prismatic joints are within their limits"
+    if all(row.kind.turns for row in table.rows):
+        return ""
+    return f"{condition} and {TRAVEL_CONDITION}" if table.unlimited else condition
 
 
 def snap_hint(table: DHTable, make_snapped_table: Callable[[float], DHTable]) -> str | None:

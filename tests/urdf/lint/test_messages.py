@@ -7,6 +7,8 @@ from urdfkin.urdf.lint import Finding, check
 
 _QUATERNION = '<origin quat_xyzw="{}"/>'
 _UNNAMED = '<material><color rgba="1 0 0 1"/></material>'
+_AT_ZERO = " if all translations are 0"
+_TIP = '<origin xyz="2 0 0"/>'
 _NUMBER = '<link name="m\u00b2\u00e4"/><link name="m2\u00e4"/>'
 _FORK = "".join(
     fixed(name, "base", name).replace("</j", '<origin xyz="2e-5 0 0"/></j') for name in ("l1", "tool")
@@ -75,6 +77,16 @@ def test_a_message_states_what_the_file_contains(name: str) -> None:
 def test_the_remedy_for_a_rounded_negative_multiple_of_pi_has_the_sign() -> None:
     remedy = _only(arm(origin='<origin rpy="-1.5708 0 0"/>'), "URDF601").remedy or ""
     assert "write -1.5707963267948966 if you mean -pi/2;" in remedy
+
+
+@pytest.mark.parametrize(
+    ("kind", "condition"), [("prismatic", " if all translations are 0"), ("revolute", "")]
+)
+def test_the_displacement_by_a_rounded_angle_has_a_condition_if_a_joint_translates(
+    kind: str, condition: str
+) -> None:
+    text = arm(attributes=f'type="{kind}"', origin='<origin rpy="3.14 0 0"/>', follow=_TIP)
+    assert f"which moves the links below by up to 3.2 mm{condition}:" in f"{_only(text, 'URDF601').sentence}:"
 
 
 def test_the_remedy_for_a_reserved_name_advises_against_the_root_joint_that_was_given() -> None:

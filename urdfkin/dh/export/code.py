@@ -11,7 +11,8 @@ import re
 from fractions import Fraction
 from typing import Any
 
-from urdfkin.dh.export.text import format_cells, formula, snap_condition
+from urdfkin.dh.export.text import format_cells, formula
+from urdfkin.dh.snapping import travel_condition
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.dh.units import COLUMNS, Units, format_pi_fraction, pi_fraction
 from urdfkin.errors import InputError
@@ -43,7 +44,7 @@ def header_lines(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        condition = f" if {holds_if}" if (holds_if := snap_condition(table)) else ""
+        condition = f" if {holds_if}" if (holds_if := travel_condition(table)) else ""
         lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m{condition}")
     return [sanitize(line) for line in lines]
 

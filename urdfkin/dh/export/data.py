@@ -14,10 +14,10 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from urdfkin.dh.snapping import travel_condition
 from urdfkin.dh.table import DHRow, DHTable
 from urdfkin.dh.units import COLUMNS
 from urdfkin.errors.escape import csv_cell, escape_sequence
-from urdfkin.model.configuration import TRAVEL_CONDITION
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
@@ -45,8 +45,8 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
                 for change in snap.changes
             ],
         }
-        if table.unlimited:
-            data["snap"]["holds_if"] = TRAVEL_CONDITION
+        if holds_if := travel_condition(table):
+            data["snap"]["holds_if"] = holds_if
     elsewhere = [name for name in table.joint_names if name not in {row.joint for row in table.rows}]
     if elsewhere:
         data["coordinates"] = elsewhere

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.snapping import SNAP_SAMPLES, sample_within_limits
+from urdfkin.dh.snapping import SNAP_SAMPLES, sample_within_limits, travel_condition
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import AngleUnit, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
-from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value
+from urdfkin.model.configuration import axis_range, largest_value
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -126,14 +126,6 @@ def format_bound(value: float) -> str:
     return f"{math.ceil(value / unit * _ROUND_UP_FACTOR) * unit:.2e}"
 
 
-def snap_condition(table: DHTable) -> str:
-    """Return the condition under which the bound of the tip's displacement holds, or ""."""
-    condition = "prismatic joints are within their limits"
-    if all(row.kind.turns for row in table.rows):
-        return ""
-    return f"{condition} and {TRAVEL_CONDITION}" if table.unlimited else condition
-
-
 def snap_lines(table: DHTable) -> list[str]:
     snap = table.snap
     if snap is None:
@@ -142,7 +134,7 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = format_bound(snap.metres), format_bound(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
-    condition = f"; this holds if {holds_if}" if (holds_if := snap_condition(table)) else ""
+    condition = f"; this holds if {holds_if}" if (holds_if := travel_condition(table)) else ""
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
         f"{radians} rad{condition}",
@@ -225,7 +217,7 @@ def _caption(table: DHTable) -> str:
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
             f" which moves the tip by at most {latex_math(format_bound(table.snap.metres))}\\,m"
         )
-        caption += f" if {holds_if}." if (holds_if := snap_condition(table)) else "."
+        caption += f" if {holds_if}." if (holds_if := travel_condition(table)) else "."
     return caption
 
 
@@ -259,18 +251,18 @@ class PrintedPrecision:
     Attributes:
         metres: Largest position error on the samples.
         bound: Proven bound within the joint limits, m.
-        unlimited: Whether `ASSUMED_LIMIT` replaces missing limits.
+        condition: Condition on the joint values under which the bound holds, or "".
     """
 
     digits: int
     metres: float
     bound: float | None
     samples: int
-    unlimited: bool = False
+    condition: str = ""
 
     def __str__(self) -> str:
         proven = "" if self.bound is None else f"; the proven bound is {format_bound(self.bound)} m"
-        condition = f"; this holds if {TRAVEL_CONDITION}" if self.unlimited else ""
+        condition = f"; this holds if {self.condition}" if self.condition else ""
         return (
             f"printed with {self.digits} digits, the table gives the tip within {format_bound(self.metres)} m"
             f" of its exact position on {self.samples} samples{proven}{condition}"
@@ -291,8 +283,8 @@ def measure_printed_table(table: DHTable, units: Units, pose_digits: int | None 
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound_tip_error(table, rows, base, tool)
     finite_bound = bound if math.isfinite(bound) else None
-    measured, unlimited = float(distances.max(initial=0.0)), bool(table.unlimited)
-    return PrintedPrecision(units.digits, measured, finite_bound, SNAP_SAMPLES, unlimited)
+    measured = float(distances.max(initial=0.0))
+    return PrintedPrecision(units.digits, measured, finite_bound, SNAP_SAMPLES, travel_condition(table))
 
 
 def _round_row(row: DHRow, units: Units) -> DHRow:

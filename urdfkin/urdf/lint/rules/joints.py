@@ -535,8 +535,10 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
     """Report legal values that are probably mistakes. `is_tree` is True if the joints form a tree."""
     reach = _reach(robot) if is_tree else {}
+    slides = any(joint.kind in ("prismatic", "planar", "floating") for joint in robot.joints)
+    condition = " if all translations are 0" if slides else ""
     for joint in robot.joints:
-        _check_angles(report, joint, reach)
+        _check_angles(report, joint, reach, condition)
         _check_lengths(report, joint)
         _check_neutral(report, joint)
     _check_equal_axes(report, robot)
@@ -544,7 +546,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> 
         _check_total_length(report, robot, reach)
 
 
-def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float]) -> None:
+def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float], condition: str) -> None:
     origin = joint.origin_element
     if origin is not None and joint.quaternion is None:
         written = origin.attributes.get("rpy", "").split(maxsplit=3)
@@ -552,7 +554,7 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
             message, found = "the angles of the origin look like degrees", quote(" ".join(written))
             _report_degrees(report, message, origin, "rpy", found)
         elif len(written) == 3:
-            _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0))
+            _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0), condition)
     limit = joint.limit
     if limit is not None and joint.kind == "revolute":
         bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
@@ -572,10 +574,13 @@ def _bounds_text(limit: LimitRecord) -> str:
     return " ".join(f"{name}={quote(written[name])}" for name in ("lower", "upper") if name in written)
 
 
-def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
+def _check_rounded(
+    report: Reporter, joint: JointRecord, written: list[str], reach: float, condition: str
+) -> None:
     """Report angles of a joint origin that are rounded multiples of pi.
 
     The message quotes the angle with the largest rounding error.
+    `condition` is the condition under which the links below are at most `reach` metres away.
     """
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
@@ -590,7 +595,9 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
         return
     origin = joint.origin_element
     named = f"-{_pi_text(multiple)}" if meant < 0.0 else _pi_text(multiple)
-    moves = f", which moves the links below by up to {_length_text(off * reach)}" if reach > 0.0 else ""
+    moves = ""
+    if reach > 0.0:
+        moves = f", which moves the links below by up to {_length_text(off * reach)}{condition}"
     report.add(
         ROUNDED_PI,
         f"rpy contains a rounded {named}, off by {off:.1e} rad{moves}",
@@ -697,7 +704,7 @@ def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return, for each link, an upper bound (m) on the distance to its descendants."""
+    """Return, for each link, the upper bound (m) on the distance of descendants if all translations are 0."""
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})
     for link in order:
