@@ -384,7 +384,8 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with the same code share a line of output.
-        accepts_all: True with --write-baseline. A finding then does not change the exit code.
+        accepts_all: True with --write-baseline. A finding of severity error then does not change the
+            exit code.
     """
 
     look: partial[Examination]

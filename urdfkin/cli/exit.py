@@ -1,8 +1,8 @@
 """Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
-SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-negative result, such as a disagreement, and never a crash. Python exits with 1 after an uncaught exception,
-so urdfkin catches unexpected exceptions and exits with 70.
+SIGTERM and SIGHUP stop `urdfkin validate` like an interrupt: finished results are saved. Exit code 1 always
+means a negative result, such as a disagreement, and never a crash. Python exits with 1 after an uncaught
+exception, so urdfkin catches unexpected exceptions and exits with 70.
 """
 
 from __future__ import annotations

@@ -130,10 +130,10 @@ def same_command(
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
     1: the models are different. 2: bad input. With --strict, the exit code is also 1 for models that are
-    equivalent only after changes of B. Some differences have no effect on motion, for example different
-    limits, joint types or links. With --strict, the exit code is also 1 for such differences. With --within,
-    the command does not change B before the comparison. Exit 0: every frame is proven to be within the given
-    distance. 1: the proof fails for at least one frame.
+    equivalent only after changes of B. Some differences have no effect on motion, for example other limits,
+    the type revolute instead of continuous, or an additional fixed link. With --strict, the exit code is also
+    1 for such differences. With --within, the command does not change B before the comparison. Exit 0: every
+    frame is proven to be within the given distance. 1: the proof fails for at least one frame.
     """
     from urdfkin.comparison.bounds import MAX_BOXES
     from urdfkin.comparison.certificate import certificate

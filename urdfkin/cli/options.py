@@ -425,7 +425,7 @@ def load_robots(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that disable options for `source` that only other sources need.
+        """Return arguments of `load` that disable options for file types other than that of `source`.
 
         If another source is a xacro file but `source` is not, the xacro options are disabled for `source`.
         The same rule applies to USD files and USD options.

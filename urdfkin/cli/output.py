@@ -62,8 +62,8 @@ class Answer:
     Attributes:
         document: Function that returns a document with texts and tables, for the formats in `TEXT_FORMATS`.
         data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
-            array for npy, or the output as text. For a format in `TEXT_FORMATS`, `data` may have a function
-            that replaces `document`.
+            array for npy, or the output as text. A function for a format in `TEXT_FORMATS` replaces
+            `document` in this format.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
         fit_document: Function that returns a document that fits the width of a terminal. None: use
             `document`.

@@ -284,7 +284,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
     """Return a table with one row for each column of a Jacobian.
 
     For a Hessian, each row has the derivative of one column of the Jacobian with respect to one joint
-    coordinate. Rows that contain only rounding errors are left out.
+    coordinate. Rows of a Hessian that contain only rounding errors are left out.
     """
     import numpy as np
 

@@ -92,9 +92,8 @@ def _report_write_errors(stream: Any, descriptor: int) -> Any:
 def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    Reading from standard input and writing to standard output must fail, as on a closed stream. Therefore,
-    standard input is opened only for writing, and standard output only for reading. Text for standard error
-    is lost.
+    Standard input is opened write-only, so that reading fails, as on a closed stream. Standard output is
+    opened read-only, so that writing fails. Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:

@@ -44,7 +44,7 @@ def quote(text: str, limit: int = MAX_QUOTE_LENGTH) -> str:
 
 
 #: A line of more than `MAX_EXCERPT_LENGTH` characters is cut.
-#: At most `MAX_EXCERPT_LEAD` characters precede the underlined text.
+#: In such a line, at most `MAX_EXCERPT_LEAD` characters precede the underlined text.
 MAX_EXCERPT_LENGTH, MAX_EXCERPT_LEAD = 100, 60
 
 _TAB = "    "
@@ -256,7 +256,7 @@ class Finding:
         return log_line(f"{place}: {self.code} {self.severity.value}: {self.sentence}")
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the finding for the JSON of a report: enums as strings, tuples as lists, without `fix`.
+        """Return the finding for a JSON report: enums as strings, tuples as lists, no `width` and `fix`.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
@@ -442,7 +442,7 @@ class _FindingGroup:
     """Findings of one code and severity.
 
     Attributes:
-        pairs: Pairs of a finding and its weight; at most `MAX_COMPLETE_FINDINGS` pairs.
+        pairs: At most `MAX_COMPLETE_FINDINGS` pairs: a finding, and the `weight` passed to `Reporter.add`.
         further_lines: Line numbers of all further findings.
     """
 
@@ -549,7 +549,7 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings, sorted by line; omit findings for which `is_reported` returns False.
 
-        `is_reported` is called once for each completely stored finding, in file order.
+        `is_reported` is called once for each finding in `_FindingGroup.pairs`, in file order.
         """
         pairs = [pair for group in self._groups.values() for pair in group.pairs]
         if is_reported is not None:

@@ -200,8 +200,8 @@ class _ModelReader:
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
         """For each body whose frame is a joint frame, yield the index of the joint and of the body.
 
-        The bodies are in reverse order. A dictionary of the pairs
-        therefore keeps the first body of each joint.
+        The bodies are in reverse order. In a dictionary of the pairs, the first body of a joint therefore
+        replaces the later bodies of the joint.
         """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.placements[i] == np.eye(4)).all():

@@ -175,7 +175,7 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _frame_values(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return one number for each frame, shape (n, frames).
+        """Return one number for each sample and frame, shape (n, frames).
 
         `at_body` has the shape (n, bodies), and `own` has the shape (sites,). The columns of the
         result are:

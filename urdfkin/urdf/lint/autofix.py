@@ -62,7 +62,7 @@ def fix_text(
     examine: Callable[[UrdfText], Examination],
     choose: Callable[[], Callable[[Finding], bool]],
 ) -> FixResult:
-    """Apply the automatic fixes to a file without errors.
+    """Apply the automatic fixes, unless the file has a finding of severity error.
 
     The fixes of one finding code, such as URDF507, are applied in one pass.
 

@@ -271,7 +271,7 @@ class FindingFilter:
 def find_known_findings(
     text: UrdfText, version: CommitFiles, examine: Callable[[UrdfText], Examination]
 ) -> Baseline | None:
-    """Return the findings of a file's older version; None if no finding can be new.
+    """Return the findings of a file's older version; None for an unchanged file without new findings.
 
     An unchanged file has no new findings, with two exceptions. First, a xacro file can include other files.
     If a file with a suffix of `_INCLUDABLE_SUFFIXES` has changed, all findings of the xacro file are new.

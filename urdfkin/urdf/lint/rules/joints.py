@@ -111,7 +111,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _check_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; if not, report links without a parent."""
+    """Return whether exactly one link has no parent; report any further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.has_errors:
@@ -473,7 +473,7 @@ class _MimicChecker:
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
     """Return the limits of a revolute or prismatic joint; +- pi for a continuous joint.
 
-    Return None for other joints, without `<limit>`, and unless lower < upper.
+    Return None for joints of other types, for a missing `<limit>`, and if lower >= upper.
     """
     if joint.kind == "continuous":
         return -math.pi, math.pi
@@ -621,7 +621,7 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 
 
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """If an angle is a rounded k * pi or -k * pi, return k and the exact angle. Otherwise return None.
+    """Return k > 0 and the exact angle if `angle` is a rounded k * pi or -k * pi, otherwise None.
 
     `text` is the angle as written in the file, and `angle` is the number (rad).
 

@@ -115,7 +115,7 @@ def _make_finding(
 def _find_positions(
     data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]
 ) -> _Positions:
-    """Return the position of each element in the file.
+    """Return line, column and width of each element in the first `_MAX_SEARCHED_BYTES` bytes.
 
     If several elements have the same tag and name, the function returns the position of the first element.
     """
