@@ -241,7 +241,13 @@ class Case(TypedDict):
     sample: Annotated[
         Count, doc("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
     ]
-    frame: Annotated[str, doc("Name of the frame: link:NAME or joint:NAME.")]
+    frame: Annotated[
+        str,
+        doc(
+            "Name of the frame (link:NAME or joint:NAME). If `subjects` is `joints` or `columns`: name of the"
+            " joint."
+        ),
+    ]
     disagreement: Units
     q: Annotated[list[float], doc("Configuration of the sample.")]
     v: Annotated[list[float], doc("Joint velocities of the sample.")]
@@ -331,7 +337,9 @@ class ReportedTimings(TypedDict):
     urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
-    second_oracle: NotRequired[Annotated[float, doc("Time of computing with the second oracle.")]]
+    second_oracle: NotRequired[
+        Annotated[float, doc("Time of computing with the second oracle, if there is one.")]
+    ]
 
 
 class ReportedSecondReading(TypedDict):
