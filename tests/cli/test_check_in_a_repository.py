@@ -205,6 +205,15 @@ def test_statistics_are_counted_by_code_and_sorted_by_number(here: Path) -> None
     assert "--statistics does nothing with --format json" in check("--statistics", "--format", "json").err
 
 
+def test_statistics_mark_the_codes_that_fix_corrects_without_another_option(here: Path) -> None:
+    turned = (
+        '<joint name="r" type="fixed"><parent link="b"/><child link="c"/><origin rpy="1.5708 0 0"/></joint>'
+    )
+    put("arm.urdf", LONG.replace("</robot>", f'<link name="c"/>{turned}</robot>'))
+    lines = check("--statistics").text.splitlines()
+    assert {line.split()[1]: "[*]" in line for line in lines[:-1]} == {"URDF503": True, "URDF601": False}
+
+
 # -- comments ------------------------------------------------------------------------------------------
 
 
