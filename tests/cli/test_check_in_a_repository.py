@@ -535,6 +535,15 @@ def test_the_hint_about_fixes_states_that_a_file_with_an_error_is_not_changed(he
     assert f"{hint}correct the errors of a file first" in check().text
 
 
+def test_no_fix_is_offered_for_a_text_that_fix_cannot_write(here: Path) -> None:
+    put("arm.xacro")
+    for done in (check("kinova"), check("arm.xacro"), urdfkin("check", "-", stdin=LONG)):
+        assert "warning" in done.text
+        assert "[*]" not in done.text
+        assert "fixes" not in done.text
+    assert "[*]" not in check("--statistics", "kinova").text
+
+
 def test_only_reported_findings_are_fixed(here: Path) -> None:
     text = LONG.replace("<parent", '<parent frame="x"')
     mended = text.replace("0 0 2", "0 0 1")
