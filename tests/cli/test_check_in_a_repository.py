@@ -205,6 +205,15 @@ def test_statistics_are_counted_by_code_and_sorted_by_number(here: Path) -> None
     assert "--statistics does nothing with --format json" in check("--statistics", "--format", "json").err
 
 
+def test_statistics_mark_the_codes_that_fix_corrects_without_another_option(here: Path) -> None:
+    turned = (
+        '<joint name="r" type="fixed"><parent link="b"/><child link="c"/><origin rpy="1.5708 0 0"/></joint>'
+    )
+    put("arm.urdf", LONG.replace("</robot>", f'<link name="c"/>{turned}</robot>'))
+    lines = check("--statistics").text.splitlines()
+    assert {line.split()[1]: "[*]" in line for line in lines[:-1]} == {"URDF503": True, "URDF601": False}
+
+
 # -- comments ------------------------------------------------------------------------------------------
 
 
@@ -534,6 +543,16 @@ def test_the_hint_about_fixes_states_that_a_file_with_an_error_is_not_changed(he
     assert f"{hint}--diff prints the changes" in check("--strict").text
     put("arm.urdf", LONG.replace('link="b"', 'link="c"'))
     assert f"{hint}correct the errors of a file first" in check().text
+
+
+def test_no_fix_is_offered_for_a_text_that_fix_cannot_write(here: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    put("arm.xacro")
+    for done in (check("kinova"), check("arm.xacro"), urdfkin("check", "-", stdin=LONG)):
+        assert "warning" in done.text
+        assert "[*]" not in done.text
+        assert "fixes" not in done.text
+    assert "[*]" not in check("--statistics", "kinova").text
 
 
 def test_only_reported_findings_are_fixed(here: Path) -> None:

@@ -323,6 +323,14 @@ def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
         check_diagnosis(found, "rows come first")
 
 
+@pytest.mark.parametrize("quantity", ["imu", "analytical jacobian"])
+@pytest.mark.parametrize("convention", ["pinocchio", "mujoco"])
+def test_a_quantity_that_no_convention_defines_is_refused(quantity: str, convention: str) -> None:
+    robot = urdfkin.load("ur5", root_joint="floating")
+    with pytest.raises(urdfkin.InputError, match="does not define how to convert this quantity"):
+        verify_function(lambda *_: None, robot, quantity, samples=2, convention=convention)
+
+
 @pytest.mark.parametrize("quantity", ["jacobian rate", "hessian"])
 def test_a_function_for_the_centre_of_mass_in_the_axes_of_the_body_is_checked(quantity: str) -> None:
     robot = urdfkin.load("go2", root_joint="floating")

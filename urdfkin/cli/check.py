@@ -72,6 +72,8 @@ class CheckOutcome:
         unsafe_count: Number of findings that only --unsafe-fixes would fix.
         with_error: Files with a finding of severity error. --fix does not change these files. A warning that
             --strict reports as an error does not count.
+        unwritable: Names of texts that --fix cannot write: standard input, an expanded .xacro file, and a
+            robot of the catalogue.
     """
 
     files: list[str] = field(default_factory=list)
@@ -86,6 +88,7 @@ class CheckOutcome:
     patches: list[str] = field(default_factory=list)
     unsafe_count: int = 0
     with_error: set[str] = field(default_factory=set)
+    unwritable: set[str] = field(default_factory=set)
 
     def add(self, file: str, found: Examination) -> None:
         formatter = ExcerptFormatter(found.data)
@@ -93,6 +96,9 @@ class CheckOutcome:
         self.findings += found.findings
         self.silenced_findings += found.silenced_findings
         self.excerpts += [formatter.format(finding) for finding in found.findings]
+
+    def findings_with_usable_fixes(self) -> list[Finding]:
+        return [replace(one, fix=None) if one.file in self.unwritable else one for one in self.findings]
 
 
 def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> None:
@@ -105,7 +111,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         if findings:
             print_commands(as_github(findings))
     elif statistics:
-        for line in format_statistics(outcome.findings):
+        for line in format_statistics(outcome.findings_with_usable_fixes()):
             say(line)
         _print_summary(outcome)
     elif outcome.files or outcome.unchanged_count:
@@ -113,7 +119,8 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
 
 
 def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
-    for finding, excerpt in zip(outcome.findings, outcome.excerpts, strict=True):
+    findings = outcome.findings_with_usable_fixes()
+    for finding, excerpt in zip(findings, outcome.excerpts, strict=True):
         place, rest = str(finding).split(f": {finding.code} ", 1)
         colour = {"fg": _COLOURS[finding.severity], "bold": True}
         mark = " [*] " if finding.fix and finding.fix.is_safe else " "
@@ -123,10 +130,10 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
             say_styled((line, {}))
             say_styled((caret, colour))
     _print_summary(outcome)
-    fixes = [finding.fix for finding in outcome.findings if finding.fix]
+    fixes = [finding.fix for finding in findings if finding.fix]
     unsafe = sum(not fix.is_safe for fix in fixes)
     if len(fixes) > unsafe:
-        refused = any(finding.fix and finding.file in outcome.with_error for finding in outcome.findings)
+        refused = any(finding.fix and finding.file in outcome.with_error for finding in findings)
         note = "correct the errors of a file first" if refused else "--diff prints the changes"
         say(f"[*] --fix fixes these findings; {note}")
     if unsafe:
@@ -435,6 +442,8 @@ class CheckRun:
         found = self.look(text, fold=self.fold, is_reported=self.finding_filter.make_predicate(text, before))
         if any(finding.severity is Severity.ERROR for finding in found.findings):
             self.outcome.with_error.add(file)
+        if _find_writable_path(text) is None:
+            self.outcome.unwritable.add(text.label)
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
@@ -475,7 +484,7 @@ class CheckRun:
         return version.contains(data) and not any(os.fsencode(name) in data for name in version.missing_names)
 
     def _fix(self, file: str, text: UrdfText, choose: Any) -> UrdfText:
-        path = None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
+        path = _find_writable_path(text)
         if path is None:
             return text
         result = fix_text(text, self.look, lambda: self._safe(choose()))
@@ -512,6 +521,11 @@ class CheckRun:
             return int(self.outcome.fixable_count > 0)
         has_error = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
         return int(has_error and not self.accepts_all)
+
+
+def _find_writable_path(text: UrdfText) -> Path | None:
+    """Return the path of the file that --fix can change; None if there is no such file."""
+    return None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
 
 
 #: Suffixes of MJCF files and of files that an MJCF file includes

@@ -256,8 +256,8 @@ class Case(TypedDict):
     frame: Annotated[
         str,
         doc(
-            "The frame (link:NAME or joint:NAME), the joint or the column of the disagreement, as `subjects`"
-            " of the check states."
+            "Name of the frame (link:NAME or joint:NAME). If `subjects` is `joints` or `columns`: name of the"
+            " joint."
         ),
     ]
     disagreement: Units
@@ -349,7 +349,9 @@ class ReportedTimings(TypedDict):
     urdfkin: Annotated[float, doc("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, doc("Time of computing with Pinocchio.")]
     compare: Annotated[float, doc("Time of computing the bounds and comparing the results.")]
-    second_oracle: NotRequired[Annotated[float, doc("Time of computing with the second oracle.")]]
+    second_oracle: NotRequired[
+        Annotated[float, doc("Time of computing with the second oracle, if there is one.")]
+    ]
 
 
 class ReportedSecondReading(TypedDict):

@@ -467,12 +467,12 @@ class _Run:
             bound = compute_bound(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
         k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
+        expected = self._convert(native_inputs, result)
         inputs: tuple[FloatArray, ...] = native_inputs
         if self.conversion is not None:
             inputs = as_tuple(self.conversion.to(*native_inputs))
             scale = self._convert_scale(native_inputs, scale)
             k = k + self._rounding_of_the_conversion(native_inputs[0]) * self.factor
-        expected = self._convert(native_inputs, result)
         actual, valid = self._call_function(inputs, expected.shape[1:], first, total)
         if oracle_results is not None:
             oracle_results = self._convert(native_inputs, np.asarray(oracle_results)[:, 0])[valid]

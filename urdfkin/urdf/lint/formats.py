@@ -108,14 +108,14 @@ def format_summary(findings: Sequence[Finding], files: int) -> str:
 def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield a line for each code. The code with the most findings comes first.
 
-    The mark `[*]` means that urdfkin can fix findings with this code.
+    The mark `[*]` means that `--fix` fixes findings with this code.
     """
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
         severities = worst.get(finding.code, finding.severity), finding.severity
         worst[finding.code] = min(severities, key=lambda severity: severity.rank)
-        fixable |= {finding.code} if finding.fix else set()
+        fixable |= {finding.code} if finding.fix and finding.fix.is_safe else set()
     for code, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         mark = "[*]" if code in fixable else "   "
         yield f"{count:7}  {code}  {worst[code].value:7}  {mark}  {find_rule(code).slug}: {page(code).title}"
