@@ -412,7 +412,7 @@ class Mechanism:
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
-            j.tilt for j in self.tree.joints
+            j.pinocchio_tilt for j in self.tree.joints
         )
 
 
