@@ -47,7 +47,7 @@ CHANGES = [
     ("kinematics.rotation.normalise_quaternions", "quat / norms", "quat * norms"),
     ("model.tree.KinematicTree._offsets",
      "(int(own[i]) for i in independent_joints)", "(int(own[i]) for i in range(len(self.joints)))"),
-    ("model.tree._last_name_first", "reverse=True", ""),
+    ("model.tree._sort_names_descending", "reverse=True", ""),
     ("urdf.reader._mimic_rules", "rule.multiplier * end.offset", "end.offset"),
     ("urdf.reader._mimic_rules", "rule.multiplier * end.multiplier", "rule.multiplier"),
     ("urdf.reader._mimic_rules", "end.mimicked_joint", "'b'"),

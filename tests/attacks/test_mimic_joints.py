@@ -219,7 +219,7 @@ def test_samples_keep_mimic_joints_within_their_limits(kind: str, offset: float,
 
 def test_a_validation_covers_the_whole_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
-    drawn = draw_samples(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
+    drawn = draw_samples(robot.tree, 2000, np.random.default_rng(0), with_zero_and_limits=True).q
     assert drawn[1:3].tolist() == [[-0.005], [0.055]]
     assert np.ptp(drawn[3:]) > 0.059
     assert np.ptp(robot.sample(2000)) <= 0.01

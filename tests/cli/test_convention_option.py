@@ -10,7 +10,7 @@ import pytest
 import urdfkin
 from tests.cli.running import good, numbers, python, refused
 from tests.cli.running import urdfkin as run
-from urdfkin.model.conventions import BUILT_IN
+from urdfkin.model.conventions import BUILT_IN_NAMES
 from urdfkin.verify.quantities import quantities_by_command
 
 OF_FRAMES = [name for name, row in quantities_by_command().items() if row.has_reference]
@@ -112,7 +112,7 @@ def test_a_batch_without_the_option_imports_no_module_of_conventions() -> None:
 
 # -- urdfkin order ---------------------------------------------------------------------------------
 
-TOOLS = [name for name in BUILT_IN if name != "idyntree"]
+TOOLS = [name for name in BUILT_IN_NAMES if name != "idyntree"]
 
 
 def test_order_prints_a_row_for_each_joint_and_a_column_for_each_convention() -> None:

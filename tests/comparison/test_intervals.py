@@ -32,7 +32,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import (
     FINE_GRID,
     Grid,
-    curvature,
+    curvature_bounds,
     point_support,
     relevant_joints,
     upper_bounds,
@@ -126,7 +126,7 @@ def search_of(
 def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
     """Return the variables' names, and bounds on the second derivatives by the variables."""
     steps, some = relevant_joints(search.alignment, search.variables, frame)
-    return curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    return curvature_bounds(steps, [one for one in some if one is not None], search.variables, frame)
 
 
 def compare_with_difference_quotients(search: DistanceSearch, frame: FramePair) -> bool:

@@ -21,7 +21,7 @@ from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.certificate import SAME, certificate, difference_text, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.matcher import MechanismMatcher
-from urdfkin.model.mechanisms.mechanism import Alignment, JointTransform, Mechanism
+from urdfkin.model.mechanisms.mechanism import Alignment, FreeJointConversion, Mechanism
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 
@@ -63,7 +63,7 @@ def test_the_number_of_matches_does_not_exceed_the_bound_of_the_start_bodies(
 ) -> None:
     tried = _tried(monkeypatch, robot(name), other(name, what))
     assert tried
-    assert all(found.match_count <= self._most_matches(base) for self, base, found in tried)
+    assert all(found.match_count <= self._match_count_bound(base) for self, base, found in tried)
 
 
 def test_start_bodies_that_cannot_improve_the_match_are_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -348,9 +348,9 @@ def test_the_transform_of_a_free_joint_must_be_a_rigid_motion_of_the_joint(kind:
     kinds = JointKind(kind)
     lift, lower, mirror = np.eye(4), np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])
     lift[2, 3], lower[2, 3] = 0.1, -0.1
-    assert JointTransform(lift, lower).holds_for(kinds)
-    assert JointTransform(lift, np.eye(4)).holds_for(kinds) is (kind == "floating")
-    assert not JointTransform(mirror, mirror).holds_for(kinds)
+    assert FreeJointConversion(lift, lower).holds_for(kinds)
+    assert FreeJointConversion(lift, np.eye(4)).holds_for(kinds) is (kind == "floating")
+    assert not FreeJointConversion(mirror, mirror).holds_for(kinds)
 
 
 def test_a_certificate_of_a_different_version_is_refused(compared: tuple[Robot, Robot, Any]) -> None:

@@ -122,7 +122,7 @@ def test_every_exported_quantity_agrees_with_pinocchio_within_the_bound(
 ) -> None:
     robot = robot_of(name)
     frame = robot.tip_frame
-    drawn = draw_samples(robot.tree, 20, np.random.default_rng(3), with_special=True)
+    drawn = draw_samples(robot.tree, 20, np.random.default_rng(3), with_zero_and_limits=True)
     checker = copy(robot.verifier)
     for row in exportable_quantities():
         inputs = (drawn.q, drawn.v, drawn.a)[: len(row.inputs)]

@@ -101,7 +101,7 @@ def test_the_motion_of_any_link_of_any_tree_is_within_the_computed_magnitude(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:
     plan = compile_tree(tree, range(len(tree.links)))
-    samples = draw_samples(tree, 5, np.random.default_rng(seed), with_special=True)
+    samples = draw_samples(tree, 5, np.random.default_rng(seed), with_zero_and_limits=True)
     q, v, a = samples.q, speed * samples.v, speed * samples.a
     size = compute_magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     vel, acc = velocities(plan, q, v), accelerations(plan, q, v, a)

@@ -13,7 +13,7 @@ import urdfkin
 from tests import urdfs
 from tests.urdfs import joint, limit, loaded
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.tree import FloatArray, KinematicTree, with_tilts, without_mimic_rules
+from urdfkin.model.tree import FloatArray, KinematicTree, with_pinocchio_tilts, without_mimic_rules
 from urdfkin.robot import Robot
 from urdfkin.urdf.lint import Severity, check
 from urdfkin.verify.oracle import QueryBatch
@@ -123,7 +123,7 @@ def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, 
     if tilt > 1e-15:
         assert max(line.bound_ratio for line in certificate.lines) > 0.01  # the bound is not too large
     if tilt > 1e-13:
-        uncorrected = Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
+        uncorrected = Robot(with_pinocchio_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
         with pytest.raises(urdfkin.VerificationError):
             uncorrected.placement(q, "l12")
 
@@ -131,7 +131,7 @@ def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, 
 @pytest.mark.parametrize("tilt", [1e-15, 1e-13])
 def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(tilt: float) -> None:
     robot = loaded(text("revolute", AXES[2], AXES[0], near(tilt, 2), AXES[1]))
-    assert [joint.tilt > 0.0 for joint in robot.tree.joints] == [False, False, True, False]
+    assert [joint.pinocchio_tilt > 0.0 for joint in robot.tree.joints] == [False, False, True, False]
     q = robot.sample(20, 1)
 
     def with_an_error(by: float) -> Robot:
@@ -149,9 +149,11 @@ def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(
 
 def test_the_tilt_of_a_joint_is_stored_and_survives_pickling() -> None:
     robot = loaded(text("revolute", AXES[2], near(1e-13, 1)))
-    assert [round(joint.tilt, 16) for joint in robot.tree.joints] == [0.0, 1e-13]
-    assert without_mimic_rules(robot.tree).joints[1].tilt > 0.0
-    assert pickle.loads(pickle.dumps(robot)).tree.joints[1].tilt == robot.tree.joints[1].tilt
+    assert [round(joint.pinocchio_tilt, 16) for joint in robot.tree.joints] == [0.0, 1e-13]
+    assert without_mimic_rules(robot.tree).joints[1].pinocchio_tilt > 0.0
+    assert (
+        pickle.loads(pickle.dumps(robot)).tree.joints[1].pinocchio_tilt == robot.tree.joints[1].pinocchio_tilt
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)

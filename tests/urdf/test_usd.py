@@ -33,7 +33,7 @@ from urdfkin.kinematics.rotation import (
     rotation_from_rpy,
 )
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
-from urdfkin.model.conventions.convention import transcode
+from urdfkin.model.conventions.convention import encode_usd_name
 from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
@@ -918,7 +918,7 @@ def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
     placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
     for link, T in zip(tree.links, placements, strict=True):
         placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
-        prims.append(body(transcode(link), "", placed, ROOT * (link == tree.links[0])))
+        prims.append(body(encode_usd_name(link), "", placed, ROOT * (link == tree.links[0])))
     joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
@@ -941,20 +941,20 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
-    ends = [transcode(tree.links[one.parent]), transcode(tree.links[k + 1])]
+    ends = [encode_usd_name(tree.links[one.parent]), encode_usd_name(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
     rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{transcode(rule.mimicked_joint)}")
+        words = FOLLOWS.format(f"joints/{encode_usd_name(rule.mimicked_joint)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
     if one.limit is not None and one.kind.has_limits:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
-    return joint(transcode(one.name), name, first, second, words, schema, limits=limits, **frames)
+    return joint(encode_usd_name(one.name), name, first, second, words, schema, limits=limits, **frames)
 
 
 _X = np.array([1.0, 0.0, 0.0])
@@ -1410,7 +1410,7 @@ def test_two_joints_of_a_stage_without_a_common_link_between_them_may_not_be_rou
 def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_rounding(
     read: Read, x: float, names: tuple[str, str]
 ) -> None:
-    hand, camera = map(transcode, names)
+    hand, camera = map(encode_usd_name, names)
     urdf = urdfs.robot(
         urdfs.joint("first", "continuous", "base", "b", 'xyz="0 0 0.5"'),
         urdfs.joint("second", "continuous", "b", names[0], f'xyz="{x} 0 0.5"'),

@@ -19,7 +19,7 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.compiled.preload import use_only
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
-from urdfkin.model.configuration import draw_base_motion, draw_samples, special_configurations
+from urdfkin.model.configuration import draw_base_motion, draw_samples, zero_and_limit_configurations
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
@@ -220,20 +220,22 @@ def test_coupled_columns_of_a_robot_without_joint_velocities_are_empty(rows: int
 # -- random samples of a validation --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("with_special", [True, False])
-def test_special_configurations_come_first_on_request(with_special: bool) -> None:
+@pytest.mark.parametrize("with_zero_and_limits", [True, False])
+def test_special_configurations_come_first_on_request(with_zero_and_limits: bool) -> None:
     robot = urdfkin.load("panda")
-    drawn = draw_samples(robot.tree, 40, np.random.default_rng(0), with_special=with_special)
-    extra = 3 if with_special else 0
+    drawn = draw_samples(robot.tree, 40, np.random.default_rng(0), with_zero_and_limits=with_zero_and_limits)
+    extra = 3 if with_zero_and_limits else 0
     assert drawn.q.shape[0] == drawn.v.shape[0] == drawn.a.shape[0] == 40 + extra
-    assert (drawn.q[:3] == special_configurations(robot.tree)).all() == with_special
+    assert (drawn.q[:3] == zero_and_limit_configurations(robot.tree)).all() == with_zero_and_limits
     limits = [joint.limit for joint in robot.tree.joints if joint.nq == 1]
-    assert special_configurations(robot.tree)[1].tolist() == [limit.lower for limit in limits if limit]
-    assert special_configurations(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
+    assert zero_and_limit_configurations(robot.tree)[1].tolist() == [limit.lower for limit in limits if limit]
+    assert zero_and_limit_configurations(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
 
 
 def test_every_eighth_sample_has_joint_velocities_a_hundred_times_as_large() -> None:
-    drawn = draw_samples(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
+    drawn = draw_samples(
+        urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_zero_and_limits=False
+    )
     demand_large_rates(drawn.v, drawn.a)
 
 

@@ -47,7 +47,7 @@ def test_the_check_of_a_single_call_records_the_results_of_the_check_of_a_batch(
     prompt, usual = urdfkin.load(name), urdfkin.load(name)
     frame = prompt.tip_frame
     for seed, reference in enumerate(Reference):
-        drawn = draw_samples(prompt.tree, 6, np.random.default_rng(seed), with_special=True)
+        drawn = draw_samples(prompt.tree, 6, np.random.default_rng(seed), with_zero_and_limits=True)
         for row in zip(drawn.q, drawn.v, drawn.a, strict=True):
             for method, count in METHODS.items():
                 where: tuple[Any, ...] = (frame,) if method == "placement" else (frame, reference)
@@ -154,7 +154,7 @@ def test_a_checked_jacobian_needs_at_most_130_function_calls(name: str) -> None:
 def test_magnitudes_of_one_configuration_are_equal_alone_and_in_a_batch(subject: str, moving: bool) -> None:
     robot = robot_of(subject) if subject in NAMES else urdfkin.load(subject, verify=False)
     rng = np.random.default_rng(1)
-    drawn = draw_samples(robot.tree, 9, rng, with_special=True)
+    drawn = draw_samples(robot.tree, 9, rng, with_zero_and_limits=True)
     drawn.v[3], drawn.a[4], drawn.v[5] = 0.0, 1e-310, 1e-200
     n = len(drawn.q)
     base = draw_base_motion(n, rng).state((n,)) if moving else FIXED_BASE_STATE

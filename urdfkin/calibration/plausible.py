@@ -39,7 +39,7 @@ from urdfkin.calibration.fit import (
 )
 from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
-from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, far_limits
+from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, FloatArray, JointKind, KinematicTree, limits_with_margin
 
 #: The rms position error of a plausible fit is at most this fraction of the reach.
 _LARGE_ERROR = 0.05
@@ -252,7 +252,7 @@ def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], li
     like_degrees, outside = list[str](), list[str]()
     for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))
-        ends = far_limits(lower, upper)
+        ends = limits_with_margin(lower, upper)
         is_far = float(column.min()) < ends[0] or float(column.max()) > ends[1]
         is_limited = math.isfinite(lower) and math.isfinite(upper)
         if is_angle and largest > MAX_PLAUSIBLE_ANGLE and (is_far or not is_limited):

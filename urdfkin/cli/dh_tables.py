@@ -212,7 +212,7 @@ def _write_tree(request: DHRequest) -> Answer:
     check = robot.verifier.check_tree_parameters(parameters) if robot.verifier.policy else None
     check_line = "\n".join([str(check or format_path_check(None)[0]), *_locked_lines(request)])
     if format_ in _PRINTED:
-        q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
+        q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_zero_and_limits=True).q
         text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"
     else:
         say(check_line, err=True)

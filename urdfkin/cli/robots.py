@@ -142,9 +142,11 @@ def order_command(robot: str, start: str | None, end: str | None) -> Answer:
 
 
 def _orders(robot: Robot) -> Answer:
-    from urdfkin.model.conventions import BUILT_IN, find_convention
+    from urdfkin.model.conventions import BUILT_IN_NAMES, find_convention
 
-    found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
+    found = {
+        name: robot.convention(name) for name in BUILT_IN_NAMES if find_convention(name).order != "given"
+    }
     cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, column in cells.items():

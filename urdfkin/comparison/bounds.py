@@ -14,7 +14,7 @@ divides the space of all variables into boxes, and bounds the distance in each b
     c_i - h_i to c_i + h_i        range of variable i in the box
     c_i + x_i,  |x_i| <= h_i      value of variable i at a configuration q in the box
     M_ij                          bound on the second derivative of D with respect to variables i and j,
-                                  for every configuration (`curvature`)
+                                  for every configuration (`curvature_bounds`)
 
     |D(q)| <= max over |x_i| <= h_i of |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j
 
@@ -39,7 +39,7 @@ from urdfkin.model.mechanisms.mechanism import (
     Variables,
     pose_difference,
 )
-from urdfkin.model.mechanisms.upper_bound import curvature, relevant_joints
+from urdfkin.model.mechanisms.upper_bound import curvature_bounds, relevant_joints
 from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
@@ -131,7 +131,7 @@ class DistanceSearch:
         for joint, at in zip(tree_a.joints, tree_a.q_index, strict=True):
             if joint.nq == 1:
                 q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
-        for name, line in self.variables.coordinates.items():
+        for name, line in self.variables.coordinates_b.items():
             q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.evaluate(values)
         return q_a, q_b
 
@@ -337,7 +337,7 @@ class BoxBounds:
             for joint in trees[0].joints
             if joint.nv == 1
         }
-        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.coordinates), strict=True):
+        for rates, tree, own in zip(self.rates, trees, (lines, search.variables.coordinates_b), strict=True):
             for joint, line in own.items():
                 if line.variable in names:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
@@ -422,7 +422,7 @@ def tighten(
     is_possible = len(some) == len(pairs) and all(search.base_fixed) and ranges_are_covered
     if not target < upper < math.inf or not is_possible:
         return upper
-    names, M = curvature(steps, some, variables, frame)
+    names, M = curvature_bounds(steps, some, variables, frame)
     boxes = BoxBounds(search, frame, names)
     ends = search.ends[boxes.at]
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])

@@ -18,9 +18,9 @@ from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     AlignmentChoices,
     FramePair,
-    JointTransform,
+    FreeJointConversion,
     Variables,
-    is_pose,
+    is_joint_pose,
     pose_difference,
     variables_of,
 )
@@ -384,7 +384,7 @@ def _read_choices(document: SameCertificate) -> AlignmentChoices:
         np.array(document["base"]),
         {one["a"]: (one["sense"], one["offset"]) for one in joints},
         {
-            one["a"]: JointTransform(np.array(given["before"]), np.array(given["behind"]), given["back"])
+            one["a"]: FreeJointConversion(np.array(given["before"]), np.array(given["behind"]), given["back"])
             for one in joints
             if (given := one["conversion"]) is not None
         },
@@ -399,7 +399,7 @@ def _choices_error(
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
-    if not is_pose(JointKind.FLOATING, choices.X):
+    if not is_joint_pose(JointKind.FLOATING, choices.X):
         return "`base`: the matrix is not a rigid motion"
     for name, conversion in choices.conversions.items():
         if not conversion.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):

@@ -22,7 +22,7 @@ from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
     FramePair,
-    JointTransform,
+    FreeJointConversion,
     MatchedJoints,
     Mechanism,
     Tolerance,
@@ -303,7 +303,7 @@ class JointMap:
     b: str
     sense: int
     offset: float
-    conversion: JointTransform | None = None
+    conversion: FreeJointConversion | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -697,7 +697,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
     for k, frame in enumerate(alignment.frames):
         is_mount = (frame.a, frame.b) in mounts
         if frame.differs and (is_mount or tables or _is_tool(alignment, frame)):
-            alignment.frames[k] = frame.as_tool()
+            alignment.frames[k] = frame.move_difference_to_tool()
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.zero_poses[frame.a], alignment.b.zero_poses[frame.b])
             ):
@@ -755,7 +755,7 @@ def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
 
 
 def _conversion_words(
-    alignment: Alignment, step: MatchedJoints, conversion: JointTransform, rounding: Tolerance
+    alignment: Alignment, step: MatchedJoints, conversion: FreeJointConversion, rounding: Tolerance
 ) -> str:
     names = alignment.b.tree.joints[step.b].name, alignment.a.tree.joints[step.a].name
     own = f"the {'inverse of the ' if conversion.back else ''}pose of q[{names[1]}]"
@@ -853,7 +853,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
     elif step.differs:
         detail = "alone" if step.axis_b is not step.axis_a else ""
         some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
-    if i in variables.rules:
+    if i in variables.rule_differences:
         some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
     return some
 
@@ -893,7 +893,7 @@ def remarks(
     # For example, the mimic rule in B can be the inverse of the mimic rule in A.
     for step in alignment.steps:
         a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
-        line = variables.coordinates.get(b.name)
+        line = variables.coordinates_b.get(b.name)
         if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.mimicked_joint}":
             some.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
     for tree, other, which in (

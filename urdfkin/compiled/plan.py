@@ -97,7 +97,7 @@ class CompiledTree:
     | parents | (steps,) | row of the previous moving joint; -1 for none |
     | lengths | (steps + frames,) | path lengths (m) to each moving joint, then to each row of `frames` |
     | depth | (frames,) | number of URDF joints from the root, in output order |
-    | tilts | (frames,) | sum of `Joint.tilt` (rad) over these URDF joints, in output order |
+    | tilts | (frames,) | sum of `Joint.pinocchio_tilt` (rad) over these URDF joints, in output order |
 
     `sum_columns`: joints with the same index in v share the column of the first joint on the path.
     `lengths`: sum of `Joint.length` over the joints after the previous moving joint, fixed joints included.
@@ -154,7 +154,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
     tilts = {0: 0.0}
     for link in depths:
         if link:
-            tilts[link] = tilts[tree.joints[link - 1].parent] + tree.joints[link - 1].tilt
+            tilts[link] = tilts[tree.joints[link - 1].parent] + tree.joints[link - 1].pinocchio_tilt
     needed = [link - 1 for link in depths if link and tree.joints[link - 1].kind.nv]
     step_of_joint = {joint: step for step, joint in enumerate(needed)}
     anchors = _anchors(tree, step_of_joint, [link - 1 for link in depths if link])

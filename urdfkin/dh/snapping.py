@@ -34,7 +34,7 @@ from urdfkin.errors.validators import as_finite_float
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, joints_between, make_chain
-from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value, sample_uniform
+from urdfkin.model.configuration import TRAVEL_CONDITION, joint_value_range, largest_value, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, freeze
 
 #: Largest permitted tolerance, rad.
@@ -124,7 +124,7 @@ def snap_report(
 
 
 def sample_within_limits(table: DHTable) -> FloatArray:
-    ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
+    ranges = {row.joint: joint_value_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SNAP_SAMPLES)
 
 

@@ -31,7 +31,7 @@ from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import axis_range, largest_value, sample_uniform
+from urdfkin.model.configuration import joint_value_range, largest_value, sample_uniform
 from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
@@ -285,7 +285,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     Returns:
         Tip positions at all samples, and the Jacobian at the first sample.
     """
-    ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
+    ranges = [joint_value_range(joint.kind, joint.limit) for joint in screws.joints]
     values = sample_uniform(ranges, _REACH_SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
 

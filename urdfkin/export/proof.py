@@ -167,7 +167,7 @@ def compare_with_pinocchio(
 ) -> Certificate:
     # `Robot.certificate` must not count these checks, so a copy of the verifier makes them.
     checker = copy(verifier)
-    samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_special=True)
+    samples = draw_samples(verifier.tree, PROOF_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
     for function in functions:
         inputs = (samples.q, samples.v, samples.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
@@ -186,7 +186,7 @@ def _make_vectors(
     """Return test vectors and single-precision bounds."""
     tree = verifier.tree
     link = tree.frame_link(frame)
-    samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_special=False)
+    samples = draw_samples(tree, VECTOR_COUNT, np.random.default_rng(1), with_zero_and_limits=False)
     inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (samples.q, samples.v, samples.a))
     part = Call(tree, plan_of, frame, reference, None, inputs).select(slice(0, VECTOR_COUNT))
     tolerances, single_tolerances, largest_bounds = (

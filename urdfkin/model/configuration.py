@@ -41,9 +41,9 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    far_limits,
     freeze,
     is_bounded,
+    limits_with_margin,
 )
 
 #: Largest absolute value (rad or m) that `sample` draws for a joint with one coordinate.
@@ -86,7 +86,7 @@ def format_range(ends: tuple[float, float]) -> str:
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
 
 
-def axis_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
+def joint_value_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
     return (-math.pi, math.pi) if kind.turns else (-ASSUMED_LIMIT, ASSUMED_LIMIT)
@@ -158,7 +158,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
 
     If no value is allowed, the lower end exceeds the upper end.
     """
-    least, most = _widen_limits(limit)
+    least, most = _widen_by_rounding(limit)
 
     def is_allowed(mimicked_joint: float) -> bool:
         return least <= rule.multiplier * mimicked_joint + rule.offset <= most
@@ -181,7 +181,7 @@ def restrict_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tup
     )
 
 
-def _widen_limits(limit: Limit) -> tuple[float, float]:
+def _widen_by_rounding(limit: Limit) -> tuple[float, float]:
     """Widen limits by one unit in the last place.
 
     Parsing rounds a decimal limit.
@@ -254,7 +254,7 @@ def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
         _names(tree, symbol),
         units(tree, symbol),
         spans,
-        poses=lambda: poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
+        poses=lambda: named_poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
         hints_by_name=lambda: _hints_by_name(tree),
         hints_by_length=lambda: _hints_by_length(tree, symbol),
     )
@@ -311,7 +311,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
     return q
 
 
-def poses(tree: KinematicTree) -> dict[str, FloatArray]:
+def named_poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named poses.
 
     In `ready`, joints without a value are at 0, or mid-range if 0 is outside.
@@ -473,7 +473,7 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
         values = q[..., at]
         if joint.mimic:
             values = joint.mimic.multiplier * values + joint.mimic.offset
-        lower, upper = _widen_limits(joint.limit)
+        lower, upper = _widen_by_rounding(joint.limit)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
@@ -484,7 +484,7 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees_hint(joint: Joint, value: float) -> str:
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > MAX_PLAUSIBLE_ANGLE):
         return ""
-    lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
+    lower, upper = limits_with_margin(joint.limit.lower, joint.limit.upper)
     if lower <= value <= upper or not joint.limit.lower <= math.radians(value) <= joint.limit.upper:
         return ""
     return f"; degrees? write {value:.6g}deg"
@@ -596,14 +596,14 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
     rule = joint.mimic
     if rule is None or not values.size:
         return
-    off = rule.multiplier * mimicked_joint + rule.offset - values
+    deviation = rule.multiplier * mimicked_joint + rule.offset - values
     if joint.kind is JointKind.CONTINUOUS:
-        off = np.arctan2(np.sin(off), np.cos(off))
-    if np.abs(off).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
+        deviation = np.arctan2(np.sin(deviation), np.cos(deviation))
+    if np.abs(deviation).max() > _MIMIC_TOLERANCE * max(1.0, float(np.abs(values).max())):
         raise InputError(
             f"the mimic joint must be {rule.multiplier:g} * {rule.mimicked_joint} + {rule.offset:g}",
             where=f"joint {joint.name}",
-            found=f"the value is off by {np.abs(off).max():.3g}",
+            found=f"the value is off by {np.abs(deviation).max():.3g}",
             remedy="load with mimic=False to give the mimic joint its own coordinate",
             question=QuestionsSection.MIMIC_JOINTS,
         )
@@ -612,7 +612,7 @@ def _check_mimic_rule(joint: Joint, mimicked_joint: FloatArray, values: FloatArr
 # -- random samples --------------------------------------------------------------------------------------
 
 #: Random positions of planar and floating joints: -2 to 2 m.
-_MAX_POSITION = 2.0
+_MAX_SAMPLED_POSITION = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -643,20 +643,23 @@ def _uniform(
 
 def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
     return np.hstack(
-        (rng.uniform(-_MAX_POSITION, _MAX_POSITION, (n, 2)), rng.uniform(-math.pi, math.pi, (n, 1)))
+        (
+            rng.uniform(-_MAX_SAMPLED_POSITION, _MAX_SAMPLED_POSITION, (n, 2)),
+            rng.uniform(-math.pi, math.pi, (n, 1)),
+        )
     )
 
 
 def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     quaternion = rng.standard_normal((n, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return np.hstack((rng.uniform(-_MAX_POSITION, _MAX_POSITION, (n, 3)), quaternion))
+    return np.hstack((rng.uniform(-_MAX_SAMPLED_POSITION, _MAX_SAMPLED_POSITION, (n, 3)), quaternion))
 
 
 _SAMPLERS = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 
-def special_configurations(tree: KinematicTree) -> FloatArray:
+def zero_and_limit_configurations(tree: KinematicTree) -> FloatArray:
     """Return the zero, lower-limit and upper-limit configurations."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = joint_ranges(tree)
@@ -676,15 +679,17 @@ def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
     return BaseMotion(placement, velocity, acceleration)
 
 
-def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
+def draw_samples(
+    tree: KinematicTree, n: int, rng: np.random.Generator, *, with_zero_and_limits: bool
+) -> Samples:
     """Draw random samples for a validation.
 
     A mimic joint may exceed its limits: the equations are also valid there.
     Quadratic terms dominate the acceleration of every eighth sample (7.129, 7.130).
     """
     q = _uniform(tree, n, rng, joint_ranges(tree))
-    if with_special:
-        q = np.concatenate((special_configurations(tree), q))
+    if with_zero_and_limits:
+        q = np.concatenate((zero_and_limit_configurations(tree), q))
     v, a = rng.standard_normal((2, len(q), tree.nv))
     v[::8] *= 100.0
     a[::8] *= 100.0

@@ -34,7 +34,7 @@ ConfigurationLike = ArrayLike | Mapping[str, ArrayLike]
 _MAX_NAMES = 8
 #: Pattern of a blank between a number and its unit.
 _BLANK_BEFORE_UNIT = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
-_BLANKS_AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
+_BLANKS_AROUND_OPERATORS = re.compile(r" ?([=*/]) ?")
 
 
 class Hint(NamedTuple):
@@ -280,7 +280,7 @@ def _split_cells(text: str) -> list[str]:
         text = text[1:-1].strip()
     if "," in text:
         return [cell.strip() for cell in text.removesuffix(",").split(",")]
-    return _BLANK_BEFORE_UNIT.sub("", _BLANKS_AROUND_SIGNS.sub(r"\1", text)).split()
+    return _BLANK_BEFORE_UNIT.sub("", _BLANKS_AROUND_OPERATORS.sub(r"\1", text)).split()
 
 
 def _split_pair(cell: str) -> tuple[str | None, str]:

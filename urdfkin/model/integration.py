@@ -27,7 +27,7 @@ from urdfkin.kinematics.rotation import (
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Largest squared angle (rad^2) for which a series replaces (|w| - sin|w|)/|w|^3, to avoid cancellation.
-_SERIES_BELOW = 0.25
+_SERIES_SQUARED_ANGLE = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -41,7 +41,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
             continue
         block = out[..., q_index : q_index + joint.nq]
         p, R = _pose(joint, block)
-        s, w = _screw(joint, step)
+        s, w = _split_block(joint, step)
         p = p + (R @ (_V(w) @ s[..., np.newaxis]))[..., 0]
         if joint.kind is JointKind.PLANAR:
             block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
@@ -90,11 +90,11 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 
 
 def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
-    p, orientation = _screw(joint, block)
+    p, orientation = _split_block(joint, block)
     return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
 
 
-def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _split_block(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Split the joint's numbers of q or v into a linear and an angular part."""
     if joint.kind is JointKind.FLOATING:
         return block[..., :3], block[..., 3:]
@@ -111,7 +111,9 @@ def _V(w: FloatArray) -> FloatArray:
     half = np.sinc(angle / math.tau)
     series = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
     coefficient = np.where(
-        square < _SERIES_BELOW, series, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
+        square < _SERIES_SQUARED_ANGLE,
+        series,
+        (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0),
     )
     V: FloatArray = np.eye(3) + 0.5 * half**2 * W + coefficient * (W @ W)
     return V

@@ -34,14 +34,14 @@ class Coupling:
     kinds: tuple[JointKind, ...]
 
     @cached_property
-    def _independent_joints(self) -> list[str]:
+    def _coordinate_by_joint(self) -> list[str]:
         pairs = zip(self.joints, self.mimics, strict=True)
         return [mimic.mimicked_joint if mimic else joint for joint, mimic in pairs]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the independent joints, in path order."""
-        return tuple(dict.fromkeys(self._independent_joints))
+        return tuple(dict.fromkeys(self._coordinate_by_joint))
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -92,7 +92,7 @@ class Coupling:
     @cached_property
     def _independent_index(self) -> list[int]:
         column = {name: i for i, name in enumerate(self.names)}
-        return [column[mimicked_joint] for mimicked_joint in self._independent_joints]
+        return [column[mimicked_joint] for mimicked_joint in self._coordinate_by_joint]
 
     @cached_property
     def _multiplier(self) -> FloatArray:

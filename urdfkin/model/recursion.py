@@ -144,34 +144,36 @@ class Recursion:
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
         return (*linear, *angular)
 
-    def _column(self, column: Column, to: Vector) -> tuple[Vector, Vector]:
+    def _column(self, column: Column, point: Vector) -> tuple[Vector, Vector]:
         if not column.turns:
             return column.z, ZERO
-        six: tuple[Vector, Vector] = self.eq.turning_column(column.z, self.eq.minus(to, column.carrier.p))
+        six: tuple[Vector, Vector] = self.eq.turning_column(column.z, self.eq.minus(point, column.carrier.p))
         return six
 
     def jacobian(
         self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
     ) -> list[SixVector]:
         """Return the Jacobian's columns (7.85)."""
-        to = ZERO if reference.at_world else s.p
-        return self._add_mimic_columns(s, reference, nv, ((one, *self._column(one, to)) for one in columns))
+        point = ZERO if reference.at_world else s.p
+        return self._add_mimic_columns(
+            s, reference, nv, ((one, *self._column(one, point)) for one in columns)
+        )
 
     def jacobian_rate(
         self, s: LinkState, columns: Sequence[Column], nv: int, reference: Reference
     ) -> list[SixVector]:
         """Return the columns' time derivatives (7.126)."""
-        to, to_rate = (ZERO, ZERO) if reference.at_world else (s.p, s.vel)
-        rates = ((one, *self._rate(s, one, to, to_rate, reference)) for one in columns)
+        point, point_rate = (ZERO, ZERO) if reference.at_world else (s.p, s.vel)
+        rates = ((one, *self._rate(s, one, point, point_rate, reference)) for one in columns)
         return self._add_mimic_columns(s, reference, nv, rates)
 
     def _rate(
-        self, s: LinkState, column: Column, to: Vector, to_rate: Vector, reference: Reference
+        self, s: LinkState, column: Column, point: Vector, point_rate: Vector, reference: Reference
     ) -> tuple[Vector, Vector]:
-        eq, carrier, (linear, angular) = self.eq, column.carrier, self._column(column, to)
+        eq, carrier, (linear, angular) = self.eq, column.carrier, self._column(column, point)
         rate, turning = eq.axis_rate(carrier.w, column.z), ZERO
         if column.turns:
-            d, d_rate = eq.minus(to, carrier.p), eq.minus(to_rate, carrier.vel)
+            d, d_rate = eq.minus(point, carrier.p), eq.minus(point_rate, carrier.vel)
             rate, turning = eq.turning_column_rate(column.z, rate, d, d_rate)
         if reference.own_axes:
             rate = eq.rate_in_turning_axes(rate, s.w, linear)
@@ -198,29 +200,42 @@ class Recursion:
         The tuples are (i, j, factor, x), where i and j are indices of v.
         For each i and j, the sum of factor * x is d(column i)/dq_j.
         """
-        to = ZERO if reference.at_world else s.p
-        ends = [(one, self._column(one, to)) for one in columns]
-        for of, six in ends:
-            for by, by_six in ends:
-                change = self._change(six, by_six, reference, before=by.order <= of.order)
-                yield of.v_index, by.v_index, of.factor * by.factor, self.in_reference(s, reference, *change)
+        point = ZERO if reference.at_world else s.p
+        computed = [(one, self._column(one, point)) for one in columns]
+        for column_i, six_i in computed:
+            for column_j, six_j in computed:
+                change = self._column_derivative(
+                    six_i, six_j, reference, is_before=column_j.order <= column_i.order
+                )
+                yield (
+                    column_i.v_index,
+                    column_j.v_index,
+                    column_i.factor * column_j.factor,
+                    self.in_reference(s, reference, *change),
+                )
 
-    def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
+    def _column_derivative(
+        self, column_i: Any, column_j: Any, reference: Reference, *, is_before: bool
+    ) -> tuple[Vector, Vector]:
         """Return d(column i)/dq_j.
 
-        six:     linear and angular part of column i
-        by:      linear and angular part of column j
-        before:  True if joint j is joint i or precedes joint i on the path
+        column_i:   linear and angular part of column i
+        column_j:   linear and angular part of column j
+        is_before:  True if joint j is joint i or precedes joint i on the path
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO
         match reference:
             case Reference.WORLD:
-                change = eq.motion_product(*by, *six) if before else change
+                change = eq.motion_product(*column_j, *column_i) if is_before else change
             case Reference.LOCAL:
-                change = change if before else eq.motion_product(*six, *by)
+                change = change if is_before else eq.motion_product(*column_i, *column_j)
             case Reference.LOCAL_WORLD_ALIGNED:
-                change = eq.turned_along(by[1], *six) if before else (eq.end_moved(six[1], by[0]), ZERO)
+                change = (
+                    eq.turned_along(column_j[1], *column_i)
+                    if is_before
+                    else (eq.end_moved(column_i[1], column_j[0]), ZERO)
+                )
             case _:
                 assert_never(reference)
         return change

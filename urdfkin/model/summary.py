@@ -11,12 +11,14 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Left-aligned columns in the table of `summarize`.
-TEXT_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
-_JOINT_TEXT_COLUMNS = (0, 1, 2, *(i + 1 for i in TEXT_COLUMNS[2:]))
+#: Left-aligned columns in the table of `summarize_robot`.
+LEFT_ALIGNED_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
+_LEFT_ALIGNED_JOINT_COLUMNS = (0, 1, 2, *(i + 1 for i in LEFT_ALIGNED_COLUMNS[2:]))
 
 
-def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
+def summarize_robot(
+    tree: KinematicTree, default_base: str, default_tip: str, order_sentence: str
+) -> TextDocument:
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
     cells = [("",) * len(columns), *(joint_cells(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
@@ -28,11 +30,11 @@ def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
     return TextDocument(
         f"{tree.name}: nq {tree.nq}, nv {tree.nv}, {len(tree.links)} links, {len(tree.joints)} joints",
         (
-            f"root {tree.links[0]}, default base {base}, default tip {tip}",
-            Table(("link", "joint", *columns), rows, left=TEXT_COLUMNS),
+            f"root {tree.links[0]}, default base {default_base}, default tip {default_tip}",
+            Table(("link", "joint", *columns), rows, left=LEFT_ALIGNED_COLUMNS),
             *map(str, range_reductions(tree)),
             f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
-            order,
+            order_sentence,
         ),
     )
 
@@ -54,7 +56,7 @@ class JointTable(dict[str, Joint], Displayable):
         ]
         heads = ("joint", "parent", "child", *columns)
         return TextDocument(
-            f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_JOINT_TEXT_COLUMNS)]
+            f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_LEFT_ALIGNED_JOINT_COLUMNS)]
         )
 
 

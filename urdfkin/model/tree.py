@@ -113,20 +113,20 @@ class Limit:
 #: Largest plausible |joint angle| (rad): some industrial wrists turn 400 degrees in each direction.
 MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
 #: A joint value is far outside the limits if both of the following conditions hold.
-#: The value exceeds a limit by more than `_FAR_DISTANCE` (rad or m).
-#: The value exceeds this limit by more than `_FAR_FRACTION` times the joint's range.
+#: The value exceeds a limit by more than `_MARGIN` (rad or m).
+#: The value exceeds this limit by more than `_MARGIN_FRACTION` times the joint's range.
 #: For a joint with only one limit, every value that exceeds this limit counts as far outside the limits.
-_FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
+_MARGIN, _MARGIN_FRACTION = 0.5, 0.25
 
 
-def far_limits(lower: float, upper: float) -> tuple[float, float]:
+def limits_with_margin(lower: float, upper: float) -> tuple[float, float]:
     """Widen the limits by a large margin.
 
-    >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
+    >>> limits_with_margin(-2.0, 2.0), limits_with_margin(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
     """
-    far = max(_FAR_DISTANCE, _FAR_FRACTION * (upper - lower)) if math.isfinite(upper - lower) else 0.0
-    return lower - far, upper + far
+    margin = max(_MARGIN, _MARGIN_FRACTION * (upper - lower)) if math.isfinite(upper - lower) else 0.0
+    return lower - margin, upper + margin
 
 
 def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
@@ -158,7 +158,8 @@ class Joint:
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, m.
         axis: (3,) unit axis in the joint frame. A planar, floating or fixed joint has (1, 0, 0).
             A locked joint keeps its axis.
-        tilt: Angle between `axis` and Pinocchio's axis, rad. urdfkin's kinematics do not use this angle.
+        pinocchio_tilt: Angle between `axis` and Pinocchio's axis, rad.
+            urdfkin's kinematics do not use this angle.
         lock: None unless the user fixed the joint.
     """
 
@@ -169,7 +170,7 @@ class Joint:
     axis: FloatArray
     limit: Limit | None = None
     mimic: Mimic | None = None
-    tilt: float = 0.0
+    pinocchio_tilt: float = 0.0
     lock: Lock | None = None
 
     def __post_init__(self) -> None:
@@ -325,19 +326,19 @@ class KinematicTree:
         return tuple(int(own[i]) for i in independent_joints)
 
     @cached_property
-    def plausible_angles(self) -> FloatArray:
+    def plausible_angle_ranges(self) -> FloatArray:
         """Smallest and largest plausible angles (2, nq), rad."""
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
-                lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
+                lower, upper = limits_with_margin(joint.limit.lower, joint.limit.upper)
                 ends[:, at] = min(lower, -MAX_PLAUSIBLE_ANGLE), max(upper, MAX_PLAUSIBLE_ANGLE)
         return freeze(ends)
 
     @cached_property
     def min_implausible_angle(self) -> float:
-        """Smallest absolute value in `plausible_angles`."""
-        return float(np.abs(self.plausible_angles).min(initial=np.inf))
+        """Smallest absolute value in `plausible_angle_ranges`."""
+        return float(np.abs(self.plausible_angle_ranges).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
 
@@ -399,8 +400,8 @@ class KinematicTree:
         if link is not None and joint is not None and link != joint + 1:
             links, joints = self.link_frames, self.joint_frames
             names = [
-                *self._unambiguous(links[link], *joints[link - 1 : link]),
-                *self._unambiguous(joints[joint], links[joint + 1]),
+                *self._first_unambiguous_name(links[link], *joints[link - 1 : link]),
+                *self._first_unambiguous_name(joints[joint], links[joint + 1]),
             ]
             raise InputError(
                 f"a link and a joint at different places have the name {name!r}",
@@ -426,7 +427,7 @@ class KinematicTree:
                 return kind(name)
         return None
 
-    def _unambiguous(self, *names: FrameName) -> list[str]:
+    def _first_unambiguous_name(self, *names: FrameName) -> list[str]:
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 
@@ -463,12 +464,12 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
     return KinematicTree(tree.name, ("universe", *tree.links), (root, *others))
 
 
-def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
-    joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
+def with_pinocchio_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
+    joints = (replace(joint, pinocchio_tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
     return KinematicTree(tree.name, tree.links, tuple(joints))
 
 
-def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
+def with_named_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
     """Add named poses."""
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
@@ -487,7 +488,7 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
         Lock(joint, values[mimicked_joint]).make_fixed_joint() if mimicked_joint in values else joint
         for joint, mimicked_joint in zip(tree.joints, independent_joints, strict=True)
     ]
-    return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)
+    return with_named_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)
 
 
 def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
@@ -501,12 +502,12 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
     # Recursion would fail for a chain of 50,000 links.
-    stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
+    stack = [(0, joint, child) for joint, child in _sort_names_descending(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()
         ordered.append(replace(joint, parent=parent_index))
         links.append(child)
-        stack += [(len(links) - 1, *pair) for pair in _last_name_first(below.get(child, []))]
+        stack += [(len(links) - 1, *pair) for pair in _sort_names_descending(below.get(child, []))]
         if len(ordered) > len(joints):
             raise InputError("the joints close a loop", where=name, found=f"joint {joint.name} reached twice")
     if len(ordered) != len(joints):
@@ -515,7 +516,7 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
     return KinematicTree(name, tuple(links), tuple(ordered))
 
 
-def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]:
+def _sort_names_descending(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]:
     return sorted(joints, key=lambda pair: pair[0].name, reverse=True)
 
 

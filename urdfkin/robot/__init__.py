@@ -35,7 +35,7 @@ from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import sample
 from urdfkin.model.configuration_like import ConfigurationLike, join_names
 from urdfkin.model.reference import Reference
-from urdfkin.model.summary import JointTable, summarize
+from urdfkin.model.summary import JointTable, summarize_robot
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import get_hook
 from urdfkin.system.locks import import_lock
@@ -194,7 +194,7 @@ class Robot(Displayable):
             from urdfkin.system.plain_xml import joint_order_sentence
 
         order = joint_order_sentence(self.urdf, self.joint_names)
-        return summarize(self.tree, self.base_frame, self.tip_frame, order)
+        return summarize_robot(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: ConfigurationLike = "ready", *, height: int = 480) -> Any:
         """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
@@ -487,7 +487,7 @@ class Robot(Displayable):
         >>> robot.limit_violations("ready"), robot.limit_violations("neutral")
         ([], ['joint panda_joint4: 0 is outside [-3.0718, -0.0698]'])
         """
-        return configuration.poses(self.tree)
+        return configuration.named_poses(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.

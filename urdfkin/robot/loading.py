@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_str, safe_repr
-from urdfkin.model.tree import with_poses, with_tilts
+from urdfkin.model.tree import with_named_poses, with_pinocchio_tilts
 from urdfkin.robot import Robot
 from urdfkin.system.files import expand_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
@@ -380,9 +380,9 @@ def make_robot(
                 warnings.warn(str(finding), UrdfWarning, stacklevel=4 if is_generated else 3)
     tree = read_tree(urdf, mimic=mimic, root_joint=root_joint)
     if tilted := find_axis_tilts(urdf):
-        tree = with_tilts(tree, tilted)
+        tree = with_pinocchio_tilts(tree, tilted)
     if text.entry is not None and text.entry.poses:
-        tree = with_poses(tree, text.entry.poses)
+        tree = with_named_poses(tree, text.entry.poses)
     robot = Robot(
         tree,
         text.data.decode("utf-8-sig"),

@@ -103,7 +103,7 @@ def accuracy_study(
     Pinocchio computes no analytical Jacobians. Therefore, the study computes two analytical Jacobians with
     eq. 7.122: one from urdfkin's rotation matrix and Jacobian, and one from Pinocchio's.
     """
-    drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_special=False)
+    drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_zero_and_limits=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
         lines = tuple(_AccuracyBatch(robot, drawn, base).lines())

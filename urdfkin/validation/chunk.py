@@ -87,7 +87,7 @@ class Chunk:
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
         samples = min(DRAW_SIZE, self.samples - i * DRAW_SIZE)
-        return draw_samples(tree, samples, rng, with_special=self.first + i == 0)
+        return draw_samples(tree, samples, rng, with_zero_and_limits=self.first + i == 0)
 
 
 @dataclass(slots=True)

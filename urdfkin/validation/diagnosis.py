@@ -383,10 +383,10 @@ class Mistakes:
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
         if self.conversion is not None:
             return
-        from urdfkin.model.conventions import BUILT_IN
+        from urdfkin.model.conventions import BUILT_IN_NAMES
 
         seen = {tuple(range(self.robot.nq))}
-        for name in BUILT_IN:
+        for name in BUILT_IN_NAMES:
             try:
                 other = self.robot.convention(name)
             except UrdfkinError:

@@ -391,7 +391,9 @@ class _Run:
 
     def check(self) -> FunctionCheck:
         robot = self.robot
-        drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        drawn = draw_samples(
+            robot.tree, self.samples, np.random.default_rng(self.seed), with_zero_and_limits=True
+        )
         total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.find_refusal(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH_SIZE):

@@ -140,7 +140,7 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
     }
     if oracle is None:
         return data | {"samples": 0, "metres": None, "worst": None, "bound_ratio": None}
-    drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_special=True)
+    drawn = draw_samples(robot.tree, _SAMPLES, np.random.default_rng(0), with_zero_and_limits=True)
     checks = [check_table(oracle, robot.tree, table, drawn) for table in tables.values()]
     return data | {
         "samples": checks[0].samples,

@@ -97,7 +97,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     metres = float(off[..., 3].max(initial=0.0))
     turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
     ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
-    unit = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
+    unit = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].pinocchio_tilt for i in ends)))
     length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
     slides = values[:, [not joint.kind.turns for joint in path.joints]]
     length += np.abs(slides).sum(axis=-1).max(initial=0.0)

@@ -273,7 +273,7 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
         for i in tree.path(link):
             joint = tree.joints[i]
             joints += 1
-            tilt += joint.tilt
+            tilt += joint.pinocchio_tilt
             reach += joint.length
             factor, offset, mimicked_joint = 1.0, 0.0, joint.name
             if (rule := joint.mimic) is not None:
@@ -290,7 +290,7 @@ def compute_error_scales(tree: KinematicTree, table: DHTable, samples: Samples) 
                 weights[joint.kind.turns][names.index(mimicked_joint)] += factor
     own = table_length(table)
     reach = np.maximum(reach, np.minimum(own, MAX_LENGTH_RATIO * reach))
-    # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
+    # `Joint.pinocchio_tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + sum_zeroed_tilts(make_chain(tree, table.tip_frame, table.base_frame))

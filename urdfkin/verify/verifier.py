@@ -316,7 +316,7 @@ class Verifier:
         if (reason := self.find_refusal()) is not None:
             _warn(reason)
             return None
-        drawn = draw_samples(self.tree, samples, np.random.default_rng(0), with_special=True)
+        drawn = draw_samples(self.tree, samples, np.random.default_rng(0), with_zero_and_limits=True)
         check = check_table(self.oracle(), self.tree, table, drawn)
         if not check.agrees:
             raise TableError(
@@ -341,7 +341,7 @@ class Verifier:
             _warn(reason)
             return None
         tree = self.tree
-        q = draw_samples(tree, TABLE_SAMPLES, np.random.default_rng(0), with_special=True).q
+        q = draw_samples(tree, TABLE_SAMPLES, np.random.default_rng(0), with_zero_and_limits=True).q
         ours = parameters.placements(q)
         theirs = self.oracle().placements(QueryBatch(tree.link_frames[1:], (q,)))
         error = np.abs(ours - theirs)[..., :3, :]
@@ -354,7 +354,7 @@ class Verifier:
             f"Pinocchio {version()}: {len(tree.links) - 1} links on {len(q)} samples within"
             f" {error[..., 3].max(initial=0.0):.2e} m, {units:.2g} eps*scale"
         )
-        tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
+        tilt = max(sum(tree.joints[i].pinocchio_tilt for i in tree.path(leaf)) for leaf in tree.leaves())
         if units > parameters.roundings + joint_roundings(0, tilt):
             raise TableError(
                 f"the tree parameters of {tree.name} disagree with Pinocchio",

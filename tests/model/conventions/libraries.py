@@ -33,7 +33,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS
-from urdfkin.model.conventions.convention import transcode
+from urdfkin.model.conventions.convention import encode_usd_name
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.plain_xml import parse_xml
@@ -218,7 +218,7 @@ def newton_usd(robot: Robot, folder: Path) -> Library:
     sim = pytest.importorskip("newton")
     builder = sim.ModelBuilder()
     builder.add_usd(_stage(robot, folder))
-    return _of_newton(robot, builder, transcode)
+    return _of_newton(robot, builder, encode_usd_name)
 
 
 def _of_newton(robot: Robot, builder: Any, spell_name: Callable[[str], str] = str) -> Library:
@@ -323,7 +323,7 @@ def usd(robot: Robot, folder: Path) -> Library:
         return T @ prim.behind, path
 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-        T, path = walk(q, bodies.get(transcode(link), ""))  # a root without joints has none
+        T, path = walk(q, bodies.get(encode_usd_name(link), ""))  # a root without joints has none
         if free:
             path += [(3 + k, z, q[:3]) for k, z in enumerate(np.eye(3))]
         J = np.zeros((6, len(v)))

@@ -21,7 +21,7 @@ from urdfkin.comparison.result import Sameness
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
-from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, as_toml, find_convention
+from urdfkin.model.conventions import BUILT_IN_NAMES, Convention, Conversion, as_toml, find_convention
 from urdfkin.model.conventions import convention as module
 from urdfkin.model.conventions.convention import JointRule, parse_convention, spell_name
 from urdfkin.model.reference import Reference
@@ -32,7 +32,7 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify.bounds import compute_magnitudes
 from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, Quantity
 
-FLOATING = tuple(name for name in BUILT_IN if name != "idyntree")
+FLOATING = tuple(name for name in BUILT_IN_NAMES if name != "idyntree")
 #: Every combination of axes, orders and points, also those that no tool has.
 _FIELDS: dict[Any, tuple[str, str]] = {
     "linear": ("body", "parent"), "angular": ("body", "parent"), "base_v": ("linear first", "angular first"),
@@ -75,15 +75,15 @@ def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArra
 
 
 def test_every_listed_convention_has_data_and_evidence() -> None:
-    assert tuple(module._load_built_in()) == BUILT_IN
-    for name in BUILT_IN:
+    assert tuple(module._load_built_in()) == BUILT_IN_NAMES
+    for name in BUILT_IN_NAMES:
         found = find_convention(name)
         assert found.note or name == "urdfkin"
         assert found.evidence == "measured" or (found.evidence == "sources" and found.sources)
     own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
-    measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
+    measured = {name for name in BUILT_IN_NAMES if find_convention(name).evidence == "measured"}
     assert measured == own | set(LIBRARIES)
-    assert {name for name in BUILT_IN if find_convention(name).measurement} == set(LIBRARIES)
+    assert {name for name in BUILT_IN_NAMES if find_convention(name).measurement} == set(LIBRARIES)
 
 
 def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_convention(

@@ -23,7 +23,7 @@ from tests.model.conventions.libraries import LIBRARIES, Library
 from tests.urdfs import joint
 from urdfkin.kinematics.roundings import PINOCCHIO_ROUNDINGS
 from urdfkin.model.base_motion import FIXED_BASE_STATE
-from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, find_convention
+from urdfkin.model.conventions import BUILT_IN_NAMES, Convention, Conversion, find_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -223,7 +223,7 @@ def _wrong_for(dog: str, convention: Convention) -> list[str]:
 
 
 def test_each_convention_is_compared_with_a_library_or_a_statement() -> None:
-    assert set(ORDERS) | set(LIBRARIES) == set(BUILT_IN)
+    assert set(ORDERS) | set(LIBRARIES) == set(BUILT_IN_NAMES)
     assert set(ORDERS) - set(BASES) == {"kdl"}  # it has no floating joint
 
 

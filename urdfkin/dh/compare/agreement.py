@@ -31,7 +31,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
-from urdfkin.model.configuration import axis_range, sample_uniform
+from urdfkin.model.configuration import joint_value_range, sample_uniform
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
@@ -186,7 +186,7 @@ def _sample_poses(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray,
 def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
     """Return prismatic joints' ranges, m."""
     return {
-        joint.name: axis_range(joint.kind, joint.limit if has_range(joint.limit) else None)
+        joint.name: joint_value_range(joint.kind, joint.limit if has_range(joint.limit) else None)
         for joint in chain.joints
         if not joint.kind.turns
     }

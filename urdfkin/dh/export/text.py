@@ -19,7 +19,7 @@ from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import AngleUnit, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
-from urdfkin.model.configuration import axis_range, largest_value
+from urdfkin.model.configuration import joint_value_range, largest_value
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -314,8 +314,8 @@ def _largest_coordinate(table: DHTable, row: DHRow) -> float:
         return 0.0
     for other in table.rows:
         if other.joint == row.mimic.mimicked_joint:
-            return max(map(abs, axis_range(other.kind, other.limit)))
-    largest = max(map(abs, axis_range(row.kind, row.limit)))
+            return max(map(abs, joint_value_range(other.kind, other.limit)))
+    largest = max(map(abs, joint_value_range(row.kind, row.limit)))
     return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)
 
 

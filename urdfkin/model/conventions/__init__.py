@@ -4,11 +4,17 @@ A convention defines, for example, the order of the joints, the axes of the base
 angles.
 """
 
-from urdfkin.model.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
+from urdfkin.model.conventions.convention import (
+    BUILT_IN_NAMES,
+    Convention,
+    JointRule,
+    as_toml,
+    find_convention,
+)
 from urdfkin.model.conventions.conversion import Conversion, Reordering, find_reordering
 
 __all__ = [
-    "BUILT_IN",
+    "BUILT_IN_NAMES",
     "Convention",
     "Conversion",
     "JointRule",

@@ -81,7 +81,7 @@ class JointRule:
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
-    def quantity(self) -> str:
+    def unit_kind(self) -> str:
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -131,7 +131,7 @@ def _load_built_in() -> dict[str, Convention]:
 
 
 #: Names of the built-in conventions, in the order of conventions.toml.
-BUILT_IN = (
+BUILT_IN_NAMES = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
 )  # fmt: skip
@@ -147,7 +147,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
         return parse_convention(read_text(path), shorten_path(path), path.stem)
-    error = UnknownNameError("convention", str(name), BUILT_IN)
+    error = UnknownNameError("convention", str(name), BUILT_IN_NAMES)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
     error.remedy = f"{error.remedy} {names}"
     raise error
@@ -164,7 +164,7 @@ def parse_convention(text: str, where: str, name: str) -> Convention:
         raise InputError("the convention file is not valid TOML", where=where, found=str(error)) from None
     like = entries.pop("like", "urdf")
     if like not in _load_built_in():
-        raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
+        raise UnknownNameError("convention", str(like), BUILT_IN_NAMES, where=where)
     base = replace(
         _load_built_in()[like], name=name, title=name, evidence="", measurement="", sources=(), note=""
     )
@@ -269,12 +269,12 @@ def _quote(text: str) -> str:
 # -- names -------------------------------------------------------------------------------------------
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
-_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: An encoded number is a sequence of characters of `_DIGITS`.
-#: The value of a character is its index in `_DIGITS`, from 0 to 61.
-#: The last character of a number has a value below `_THRESHOLD`.
-#: For all other characters, the index in `_DIGITS` is at least `_THRESHOLD`.
-_THRESHOLD = 31
+_BASE_62_DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
+#: An encoded number is a sequence of characters of `_BASE_62_DIGITS`.
+#: The value of a character is its index in `_BASE_62_DIGITS`, from 0 to 61.
+#: The last character of a number has a value below `_PUNYCODE_THRESHOLD`.
+#: For all other characters, the index in `_BASE_62_DIGITS` is at least `_PUNYCODE_THRESHOLD`.
+_PUNYCODE_THRESHOLD = 31
 
 
 def spell_name(name: str, style: str) -> str:
@@ -285,7 +285,7 @@ def spell_name(name: str, style: str) -> str:
     """
     match style:
         case "usd":
-            return transcode(name)
+            return encode_usd_name(name)
         case "identifier":
             return make_identifier(name)
         case "isaacsim":
@@ -313,7 +313,7 @@ def make_identifier(name: str) -> str:
     return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"
 
 
-def transcode(name: str) -> str:
+def encode_usd_name(name: str) -> str:
     """Transcode a name as `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     An identifier is returned unchanged.
@@ -329,7 +329,7 @@ def transcode(name: str) -> str:
 
     Source: github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
-    >>> transcode("1"), transcode("arm-2"), transcode("arm_2")
+    >>> encode_usd_name("1"), encode_usd_name("arm-2"), encode_usd_name("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')
     """
     if _IDENTIFIER.fullmatch(name):
@@ -339,11 +339,11 @@ def transcode(name: str) -> str:
     previous = 0
     for code, i in sorted((ord(letter), i) for i, letter in enumerate(name) if i not in set(placed)):
         number = (code - previous) * (len(placed) + 1) + sum(k < i for k in placed)
-        while number >= _THRESHOLD:
-            rest, digit = divmod(number - _THRESHOLD, len(_DIGITS) - _THRESHOLD)
-            out += _DIGITS[_THRESHOLD + digit]
+        while number >= _PUNYCODE_THRESHOLD:
+            rest, digit = divmod(number - _PUNYCODE_THRESHOLD, len(_BASE_62_DIGITS) - _PUNYCODE_THRESHOLD)
+            out += _BASE_62_DIGITS[_PUNYCODE_THRESHOLD + digit]
             number = rest
-        out += _DIGITS[number]
+        out += _BASE_62_DIGITS[number]
         placed.append(i)
         previous = code
     return out

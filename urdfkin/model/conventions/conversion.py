@@ -35,14 +35,14 @@ class _TargetNumber:
     """One coordinate or one joint velocity of the target program.
 
     The value is y = factor * x[index] + zero, where x is urdfkin's q or v.
-    If `part` is "cos" or "sin", the value is cos(y) or sin(y).
+    If `cos_or_sin` is "cos" or "sin", the value is cos(y) or sin(y).
     """
 
     name: str
     index: int
     factor: float = 1.0
     zero: float = 0.0
-    part: str = ""
+    cos_or_sin: str = ""
     unit: str = ""
     is_mimic: bool = False
 
@@ -52,17 +52,17 @@ class _FreeJoint:
     """A planar or floating joint with a block in `Conversion.matrix`.
 
     Attributes:
-        q: First index in urdfkin's q.
-        v: First index in urdfkin's v.
-        rows: Indices in the target program's v.
-        point: (3,) the link's origin or centre of mass, in the joint's frame (m).
+        q_index: First index in urdfkin's q.
+        v_index: First index in urdfkin's v.
+        target_slice: Indices in the target program's v.
+        velocity_point: (3,) the link's origin or centre of mass, in the joint's frame (m).
     """
 
     joint: Joint
-    q: int
-    v: int
-    rows: slice
-    point: FloatArray
+    q_index: int
+    v_index: int
+    target_slice: slice
+    velocity_point: FloatArray
 
 
 class Conversion:
@@ -95,7 +95,7 @@ class Conversion:
         self.tree, self.convention = tree, convention
         self._urdf = urdf
         for name in convention.rules:
-            self._index(name)
+            self._find_joint_index(name)
         self._order = self._find_order()
         self._columns, self._rates = list[_TargetNumber](), list[_TargetNumber]()
         self._blocks = list[_FreeJoint]()
@@ -112,12 +112,12 @@ class Conversion:
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
-            return self._order_of_names(moving)
+            return self._read_given_order(moving)
         if how.mimic == "none":
             moving -= {i for i in moving if tree.joints[i].mimic}
         return [i for i in self._sort_joints() if i in moving]
 
-    def _order_of_names(self, moving: set[int]) -> list[int]:
+    def _read_given_order(self, moving: set[int]) -> list[int]:
         how = self.convention
         if not how.joints:
             raise InputError(
@@ -127,7 +127,7 @@ class Conversion:
                 " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
-        all_names = [(name, self._index(own.get(name, name))) for name in how.joints]
+        all_names = [(name, self._find_joint_index(own.get(name, name))) for name in how.joints]
         named = [(name, i) for name, i in all_names if self.tree.joints[i].lock is None]
         order = [i for _, i in named]
         for name, i in named:
@@ -145,7 +145,7 @@ class Conversion:
             )
         return order
 
-    def _index(self, joint: str) -> int:
+    def _find_joint_index(self, joint: str) -> int:
         if joint not in (names := [one.name for one in self.tree.joints]):
             raise UnknownNameError("joint", joint, names, where=f"{self.convention.name}, {self.tree.name}")
         return self.tree.joint_index(joint)
@@ -174,7 +174,7 @@ class Conversion:
         if order.startswith("breadth first"):
             joint_roundings = [joint.name for joint in tree.joints]
             keys = joint_roundings if order.endswith(("by name", "fixed joints")) else ranks
-            return self._breadth_first(children, keys, merged=not order.endswith("fixed joints"))
+            return self._breadth_first(children, keys, merge_fixed=not order.endswith("fixed joints"))
         ordered_joints, stack = [], sorted(children.get(0, []), key=ranks.__getitem__, reverse=True)
         while stack:
             ordered_joints.append(i := stack.pop())
@@ -182,11 +182,11 @@ class Conversion:
         return ordered_joints
 
     def _breadth_first(
-        self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
+        self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merge_fixed: bool
     ) -> list[int]:
         """Sort the joints breadth first, and siblings by `keys`.
 
-        If `merged` is true, links that a fixed joint connects count as one link.
+        If `merge_fixed` is true, links that a fixed joint connects count as one link.
         """
 
         def below(link: int) -> list[int]:
@@ -195,7 +195,7 @@ class Conversion:
             for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
-                    if self.tree.joints[i].original.kind.nv or not merged:
+                    if self.tree.joints[i].original.kind.nv or not merge_fixed:
                         joints.append(i)
                     else:
                         links.append(i + 1)
@@ -234,9 +234,9 @@ class Conversion:
 
     def _add_axis(self, joint: Joint, rule: JointRule, name: str, q: int, v: int) -> None:
         how, turns = self.convention, joint.kind.turns
-        if rule.quantity and (rule.quantity == "angle") != turns:
+        if rule.unit_kind and (rule.unit_kind == "angle") != turns:
             raise InputError(
-                f"this `unit` is for a joint with {'an angle' if rule.quantity == 'angle' else 'a length'}",
+                f"this `unit` is for a joint with {'an angle' if rule.unit_kind == 'angle' else 'a length'}",
                 where=f"{how.name}: joint {joint.name}",
                 found=joint.kind.value,
             )
@@ -275,7 +275,9 @@ class Conversion:
         how, joint = self.convention, self.tree.joints[i]
         self._columns += [_TargetNumber(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xy")]
         if how.continuous == 2:
-            self._columns += [_TargetNumber(f"{name}.{part}", q + 2, part=part) for part in ("cos", "sin")]
+            self._columns += [
+                _TargetNumber(f"{name}.{part}", q + 2, cos_or_sin=part) for part in ("cos", "sin")
+            ]
         else:
             self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
         first = len(self._rates)
@@ -299,23 +301,23 @@ class Conversion:
         columns, rates = self._columns, self._rates
         self.nq, self.nv = len(columns), len(rates)
         self._q_index = np.array([c.index for c in columns], dtype=np.intp)
-        self._q_factor = np.array([1.0 if c.part else c.factor for c in columns])
-        self._q_zero = np.array([0.0 if c.part else c.zero for c in columns])
+        self._q_factor = np.array([1.0 if c.cos_or_sin else c.factor for c in columns])
+        self._q_zero = np.array([0.0 if c.cos_or_sin else c.zero for c in columns])
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
-        self._plain_q &= not any(c.part for c in columns)
+        self._plain_q &= not any(c.cos_or_sin for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        self._q_source = _sources(columns, self.tree.nq)
+        self._q_target_index = _target_indices(columns, self.tree.nq)
         self._v_index = np.array([rate.index for rate in rates], dtype=np.intp)
         self._v_factor = np.array([rate.factor for rate in rates])
         self._plain_v = bool((self._v_factor == 1.0).all()) and not self._blocks
         self._same_v = self._plain_v and np.array_equal(self._v_index, np.arange(self.tree.nv))
-        self._v_source = _sources(rates, self.tree.nv)
+        self._v_target_index = _target_indices(rates, self.tree.nv)
         self.angular_first = self.convention.six_vectors == "angular first"
 
     @property
     def has_pairs(self) -> bool:
         """Whether the target program's q contains cosines and sines."""
-        return any(column.part for column in self._columns)
+        return any(column.cos_or_sin for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -335,7 +337,7 @@ class Conversion:
             return CoordinateLayout(symbol, self.velocity_names, units, poses=lambda: rest)
 
         def convert_poses() -> dict[str, FloatArray]:
-            return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
+            return {name: self.to(q) for name, q in configuration.named_poses(self.tree).items()}
 
         units = tuple(column.unit for column in self._columns)
         return CoordinateLayout(symbol, self.coordinate_names, units, poses=convert_poses)
@@ -403,11 +405,11 @@ class Conversion:
         True
         """
         inputs = self._parse_inputs(q, v, a)
-        results = [self._to_q(inputs[0])]
+        results = [self._to_target_q(inputs[0])]
         if len(inputs) > 1:
-            results.append(self._to_rates(inputs[0], inputs[1]))
+            results.append(self._to_target_rates(inputs[0], inputs[1]))
         if len(inputs) > 2:
-            results.append(self._to_rates(inputs[0], inputs[2], inputs[1]))
+            results.append(self._to_target_rates(inputs[0], inputs[2], inputs[1]))
         return results[0] if len(results) == 1 else tuple(results)
 
     @overload
@@ -431,11 +433,11 @@ class Conversion:
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
-        results = [self._from_q(self._check_target(q, "q"))]
+        results = [self._from_target_q(self._check_target(q, "q"))]
         if v is not None:
-            results.append(self._from_rates(results[0], self._check_target(v, "v")))
+            results.append(self._from_target_rates(results[0], self._check_target(v, "v")))
         if a is not None:
-            results.append(self._from_rates(results[0], self._check_target(a, "a"), results[1]))
+            results.append(self._from_target_rates(results[0], self._check_target(a, "a"), results[1]))
         return results[0] if len(results) == 1 else tuple(results)
 
     def _parse_inputs(self, *values: ConfigurationLike | None) -> list[FloatArray]:
@@ -456,7 +458,7 @@ class Conversion:
             )
         return array
 
-    def _to_q(self, q: FloatArray) -> FloatArray:
+    def _to_target_q(self, q: FloatArray) -> FloatArray:
         if self._same_q:
             return q
         target_q: FloatArray = q[..., self._q_index]
@@ -464,21 +466,21 @@ class Conversion:
             return target_q
         target_q = target_q * self._q_factor + self._q_zero
         for k, column in enumerate(self._columns):
-            if column.part:
+            if column.cos_or_sin:
                 value = q[..., column.index] * column.factor + column.zero
-                target_q[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
+                target_q[..., k] = np.cos(value) if column.cos_or_sin == "cos" else np.sin(value)
         return target_q
 
-    def _from_q(self, target_q: FloatArray) -> FloatArray:
+    def _from_target_q(self, target_q: FloatArray) -> FloatArray:
         if self._same_q:
             return target_q
-        source = self._q_source
+        source = self._q_target_index
         q: FloatArray = target_q[..., source]
         if not self._plain_q:
             q = (q - self._q_zero[source]) / self._q_factor[source]
         for at, k in enumerate(source):
             column = self._columns[k]
-            if column.part:
+            if column.cos_or_sin:
                 pair = target_q[..., k : k + 2]
                 norm = np.linalg.norm(pair, axis=-1)
                 if (np.abs(norm - 1.0) > NORM_TOLERANCE).any():
@@ -490,7 +492,7 @@ class Conversion:
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
                 q[..., at] = (angle - column.zero) / column.factor
         copies = [(k, column) for k, column in enumerate(self._columns) if column.is_mimic]
-        expected = self._to_q(q) if copies else target_q
+        expected = self._to_target_q(q) if copies else target_q
         for k, column in copies:
             difference = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
             if difference > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
@@ -503,34 +505,38 @@ class Conversion:
                 )
         return q
 
-    def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M x + M' v, or M x without v."""
+    def _to_target_rates(
+        self, q: FloatArray, own_rates: FloatArray, v: FloatArray | None = None
+    ) -> FloatArray:
+        """Return M x + M' v, or M x without v; x is `own_rates`."""
         if self._same_v:
-            return x
-        rates: FloatArray = x[..., self._v_index]
+            return own_rates
+        rates: FloatArray = own_rates[..., self._v_index]
         if self._plain_v:
             return rates
         rates = rates * self._v_factor
         for block in self._blocks:
-            own = slice(block.v, block.v + block.joint.kind.nv)
+            own = slice(block.v_index, block.v_index + block.joint.kind.nv)
             B = self._block(block, q)
-            part = _multiply(B, x[..., own])
+            part = _multiply(B, own_rates[..., own])
             if v is not None:
                 part = part + _multiply(self._block(block, q, v[..., own]), v[..., own])
-            rates = _replace_slice(rates, block.rows, part)
+            rates = _replace_slice(rates, block.target_slice, part)
         return rates
 
-    def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M^-1 (x - M' v), or M^-1 x without v."""
+    def _from_target_rates(
+        self, q: FloatArray, target_rates: FloatArray, v: FloatArray | None = None
+    ) -> FloatArray:
+        """Return M^-1 (x - M' v), or M^-1 x without v; x is `target_rates`."""
         if self._same_v:
-            return x
-        rates: FloatArray = x[..., self._v_source]
+            return target_rates
+        rates: FloatArray = target_rates[..., self._v_target_index]
         if self._plain_v:
             return rates
-        rates = rates / self._v_factor[self._v_source]
+        rates = rates / self._v_factor[self._v_target_index]
         for block in self._blocks:
-            own = slice(block.v, block.v + block.joint.kind.nv)
-            part = x[..., block.rows]
+            own = slice(block.v_index, block.v_index + block.joint.kind.nv)
+            part = target_rates[..., block.target_slice]
             if v is not None:
                 part = part - _multiply(self._block(block, q, v[..., own]), v[..., own])
             rates = _replace_slice(rates, own, _multiply(_inverse(self._block(block, q)), part))
@@ -562,7 +568,9 @@ class Conversion:
         configurations = configuration.parse_finite(self.tree, q, "q")
         M = np.tile(M, (*configurations.shape[:-1], 1, 1))
         for block in self._blocks:
-            M[..., block.rows, block.v : block.v + block.joint.kind.nv] = self._block(block, configurations)
+            M[..., block.target_slice, block.v_index : block.v_index + block.joint.kind.nv] = self._block(
+                block, configurations
+            )
         return M
 
     def matrix_rate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
@@ -575,8 +583,8 @@ class Conversion:
         shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
         M_rate = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
-            own = slice(block.v, block.v + block.joint.kind.nv)
-            M_rate[..., block.rows, own] = self._block(block, configurations, velocities[..., own])
+            own = slice(block.v_index, block.v_index + block.joint.kind.nv)
+            M_rate[..., block.target_slice, own] = self._block(block, configurations, velocities[..., own])
         return M_rate
 
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
@@ -589,11 +597,13 @@ class Conversion:
         """
         if not self._blocks:
             M_inverse = np.zeros((self.tree.nv, self.nv))
-            M_inverse[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
+            M_inverse[np.arange(self.tree.nv), self._v_target_index] = (
+                1.0 / self._v_factor[self._v_target_index]
+            )
             return M_inverse
         M = self.matrix(q)
         M_inverse = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
-        M_inverse[..., self._v_source] = _inverse(M[..., self._v_source, :])
+        M_inverse[..., self._v_target_index] = _inverse(M[..., self._v_target_index, :])
         return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
@@ -603,7 +613,7 @@ class Conversion:
         """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
-            angle = q[..., block.q + 2]
+            angle = q[..., block.q_index + 2]
             cosine, sine = np.cos(angle), np.sin(angle)
             if v is not None:
                 cosine, sine, unit = -sine * v[..., 2], cosine * v[..., 2], 0.0
@@ -612,17 +622,17 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
-        R, own_axes = rotation_from_quaternion(q[..., block.q + 3 : block.q + 7]), np.eye(3)
+        R, own_axes = rotation_from_quaternion(q[..., block.q_index + 3 : block.q_index + 7]), np.eye(3)
         if v is not None:
             R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
         own_axes = np.broadcast_to(own_axes, R.shape)
         A = R if how.linear == "parent" else own_axes
         turn = R if how.angular == "parent" else own_axes
-        return self._rows(A, -A @ skew(block.point), unit * turn)
+        return self._assemble_block(A, -A @ skew(block.velocity_point), unit * turn)
 
-    def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
-        B = np.zeros((*A.shape[:-2], 6, 6))
-        B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
+    def _assemble_block(self, linear: FloatArray, lever: FloatArray, angular: FloatArray) -> FloatArray:
+        B = np.zeros((*linear.shape[:-2], 6, 6))
+        B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = linear, lever, angular
         return B if self.convention.base_v == "linear first" else B[..., _ANGULAR_FIRST, :]
 
     # -- results -------------------------------------------------------------------------------------
@@ -658,7 +668,7 @@ class Conversion:
         Raises:
             InputError: The target program has additional columns for mimic joints.
         """
-        self._check_columns()
+        self._refuse_mimic_columns()
         array = np.asarray(J, dtype=np.float64)
         if self._plain_v:
             return array if self._same_v else array[..., self._v_index]
@@ -696,7 +706,7 @@ class Conversion:
             J: (..., 6, nv) Jacobian.
             H: (..., 6, nv, nv) derivatives of J by the coordinates.
         """
-        self._check_columns()
+        self._refuse_mimic_columns()
         inverse, tensor, columns = (
             self.inverse_matrix(q),
             self.reorder_six_vector(H, -3),
@@ -747,9 +757,9 @@ class Conversion:
             found=quantity,
         )
 
-    def _check_columns(self) -> None:
+    def _refuse_mimic_columns(self) -> None:
         copies = (
-            rate.name for k, rate in enumerate(self._rates) if rate.is_mimic and k not in self._v_source
+            rate.name for k, rate in enumerate(self._rates) if rate.is_mimic and k not in self._v_target_index
         )
         if (name := next(copies, None)) is not None:
             raise InputError(
@@ -802,17 +812,24 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
             return None
         own, other = start._columns, end._columns
         index = tuple(
-            next(k for k, c in enumerate(own) if (c.index, c.part) == (x.index, x.part) and not c.is_mimic)
+            next(
+                k
+                for k, c in enumerate(own)
+                if (c.index, c.cos_or_sin) == (x.index, x.cos_or_sin) and not c.is_mimic
+            )
             for x in other
         )
         if any(
-            x.part and (x.factor, x.zero) != (own[k].factor, own[k].zero)
+            x.cos_or_sin and (x.factor, x.zero) != (own[k].factor, own[k].zero)
             for k, x in zip(index, other, strict=True)
         ):
             return None
-        factor = [1.0 if x.part else x.factor / own[k].factor for k, x in zip(index, other, strict=True)]
+        factor = [
+            1.0 if x.cos_or_sin else x.factor / own[k].factor for k, x in zip(index, other, strict=True)
+        ]
         zero = [
-            0.0 if x.part else x.zero - own[k].zero * f for k, x, f in zip(index, other, factor, strict=True)
+            0.0 if x.cos_or_sin else x.zero - own[k].zero * f
+            for k, x, f in zip(index, other, factor, strict=True)
         ]
         return Reordering(index, tuple(factor), tuple(zero))
     axes = ("linear", "angular", "point", "planar")
@@ -820,13 +837,13 @@ def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reorderi
         start._blocks or end._blocks
     ):
         return None
-    index = tuple(start._v_source[rate.index] for rate in end._rates)
+    index = tuple(start._v_target_index[rate.index] for rate in end._rates)
     pairs = zip(end._rates, index, strict=True)
     factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
     return Reordering(index, factors, (0.0,) * len(index))
 
 
-def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
+def _target_indices(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
     """Return indices k for which x_tool[..., k] has the order of urdfkin's q or v.
 
     A mimic joint is used only if the target program has no coordinate of the mimicked joint.

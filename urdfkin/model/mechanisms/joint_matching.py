@@ -7,7 +7,7 @@ paired by geometry, the most similar joints first.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. With these zero offsets, links with equal labels must also coincide. The multipliers
-of the mimic rules must correspond; the method `SubtreeMatcher.ignore_rules` removes this condition.
+of the mimic rules must correspond; the method `SubtreeMatcher.ignore_mimic_rules` removes this condition.
 
 The value of the joint before a subtree does not matter, because the joint's zero offset can compensate any
 value. Therefore, the result of a comparison depends on two things only: the two joints before the subtrees,
@@ -60,24 +60,24 @@ class JointMatcher:
     def __init__(self, a: Mechanism, b: Mechanism, name_map: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.name_map, self._tolerance = a, b, name_map, tolerance
         self._named = {name for pair in name_map.items() for name in pair}
-        self._signatures: dict[tuple[bool, int, int], str] = {}
+        self._subtree_shapes: dict[tuple[bool, int, int], str] = {}
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], PreviousEdges], tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]
         ]()
 
-    def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
+    def link_pairs(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
         if (known := self._links.get((body_a, body_b))) is None:
-            there = {self.b.labels[link]: link for link in self.b.bodies[body_b]}
+            links_b = {self.b.labels[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
-                (link, there[name])
+                (link, links_b[name])
                 for link in self.a.bodies[body_a]
-                if (name := self.a.labels[link]) in there
+                if (name := self.a.labels[link]) in links_b
             )
         return known
 
-    def edges(
-        self, bodies: tuple[int, int], via: PreviousEdges, G: FloatArray, XC: FloatArray
+    def pair_joints(
+        self, bodies: tuple[int, int], via: PreviousEdges, motion_a: FloatArray, motion_b: FloatArray
     ) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         """Pair the joints at two bodies.
 
@@ -86,24 +86,24 @@ class JointMatcher:
         Returns:
             Joint pairs, unpaired joints of A, and unpaired joints of B.
         """
-        named, left_a, left_b = self.pair_by_name(bodies, via)
+        named, unpaired_a, unpaired_b = self.pair_by_name(bodies, via)
         pairs = list(named)
-        rest = sorted(
+        ranked = sorted(
             (self._dissimilarity(one, other), i, j)
-            for i, one in self._geometries(self.a, bodies[0], left_a, G)
-            for j, other in self._geometries(self.b, bodies[1], left_b, XC)
+            for i, one in self._geometries(self.a, bodies[0], unpaired_a, motion_a)
+            for j, other in self._geometries(self.b, bodies[1], unpaired_b, motion_b)
             if one.kind == other.kind
         )
         taken_a, taken_b = set[int](), set[int]()
-        for _, i, j in rest:
+        for _, i, j in ranked:
             if i not in taken_a and j not in taken_b:
-                pairs.append((left_a[i], left_b[j]))
+                pairs.append((unpaired_a[i], unpaired_b[j]))
                 taken_a.add(i)
                 taken_b.add(j)
         return (
             pairs,
-            [edge for i, edge in enumerate(left_a) if i not in taken_a],
-            [edge for j, edge in enumerate(left_b) if j not in taken_b],
+            [edge for i, edge in enumerate(unpaired_a) if i not in taken_a],
+            [edge for j, edge in enumerate(unpaired_b) if j not in taken_b],
         )
 
     def pair_by_name(
@@ -123,13 +123,13 @@ class JointMatcher:
 
     def has_same_shape(self, bodies: tuple[int, int], via: PreviousEdges) -> bool:
         shapes = (
-            sorted(self._signature(m, body, edge) for edge in m.edges_by_body[body] if edge is not by)
+            sorted(self._subtree_shape(m, body, edge) for edge in m.edges_by_body[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
         )
         return next(shapes) == next(shapes)
 
     def have_equal_subtrees(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
+        return self._subtree_shape(self.a, bodies[0], e) == self._subtree_shape(self.b, bodies[1], f)
 
     def all_axes_coincide(self, bodies: tuple[int, int], X: FloatArray) -> bool:
         """Return whether each joint axis at A's body coincides with one at B's body.
@@ -176,7 +176,7 @@ class JointMatcher:
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
         return [
-            (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
+            (i, _JointGeometry.of(mechanism, edge, T, self._subtree_shape(mechanism, body, edge)))
             for i, edge in enumerate(edges)
             if mechanism.joint(edge).name not in self._named
         ]
@@ -188,22 +188,22 @@ class JointMatcher:
         )
         origins = math.dist(one.origin, other.origin)
         is_opposite = bool(one.screw.direction @ other.screw.direction < 0.0)
-        return one.shape != other.shape, axes, origins + self.a.size * is_opposite
+        return one.subtree_shape != other.subtree_shape, axes, origins + self.a.size * is_opposite
 
-    def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
+    def _subtree_shape(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
         key = mechanism is self.a, body, edge.joint
-        if (known := self._signatures.get(key)) is None:
-            beyond = edge.other_body(body)
+        if (known := self._subtree_shapes.get(key)) is None:
+            next_body = edge.other_body(body)
             below = sorted(
-                self._signature(mechanism, beyond, other)
-                for other in mechanism.edges_by_body[beyond]
+                self._subtree_shape(mechanism, next_body, other)
+                for other in mechanism.edges_by_body[next_body]
                 if other is not edge
             )
             known = f"({motion_type(mechanism.joint(edge).kind)}{''.join(below)})"
-            self._signatures[key] = known
+            self._subtree_shapes[key] = known
         return known
 
-    def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
+    def mismatch(self, e: Edge, f: Edge, motion_a: FloatArray, motion_b: FloatArray) -> tuple[float, float]:
         """Return the difference of two joint axes.
 
         Returns:
@@ -219,23 +219,27 @@ class JointMatcher:
         if kind != motion_type(self.b.joint(f).kind):
             return 0.0, 0.0
         if kind == "planar":
-            return _JointGeometry.of(self.a, e, G).mismatch(_JointGeometry.of(self.b, f, XC))
-        return _line_difference(kind, self.a.screw(e).transform(G), self.b.screw(f).transform(XC))
+            return _JointGeometry.of(self.a, e, motion_a).mismatch(_JointGeometry.of(self.b, f, motion_b))
+        return _line_difference(
+            kind, self.a.screw(e).transform(motion_a), self.b.screw(f).transform(motion_b)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointGeometry:
     kind: str
-    shape: str
+    subtree_shape: str
     screw: Screw
     origin: list[float]
     normal: FloatArray
 
     @classmethod
-    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
+    def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, subtree_shape: str = "") -> _JointGeometry:
         pose = T @ mechanism.zero_poses[edge.joint + 1]
         screw = mechanism.screw(edge).transform(T)
-        return cls(motion_type(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
+        return cls(
+            motion_type(mechanism.joint(edge).kind), subtree_shape, screw, pose[:3, 3].tolist(), pose[:3, 2]
+        )
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
         if self.kind == "planar":
@@ -258,23 +262,24 @@ Both = tuple[_Some, _Some]
 class Axis:
     """A joint's axis in the zero configuration.
 
-    `reference` is a line, usually the previous joint's axis. The axis of a prismatic joint has no position.
+    `reference_line` is usually the previous joint's axis.
+    The axis of a prismatic joint has no position.
     """
 
     screw: Screw
     turns: bool
-    reference: Screw
+    reference_line: Screw
 
     def transform(self, T: FloatArray) -> Axis:
-        return Axis(self.screw.transform(T), self.turns, self.reference.transform(T))
+        return Axis(self.screw.transform(T), self.turns, self.reference_line.transform(T))
 
-    def height(self, u: FloatArray) -> float | None:
+    def nearest_point_coordinate(self, u: FloatArray) -> float | None:
         """Find the point of the reference line that is nearest to the axis.
 
         Returns:
             The point's coordinate along u (m); None for prismatic joints and parallel lines.
         """
-        s, start = self.screw, self.reference
+        s, start = self.screw, self.reference_line
         along_s = float(start.direction @ s.direction)
         if not self.turns or 1.0 - along_s**2 < PARALLEL_TOLERANCE**2:
             return None
@@ -286,9 +291,12 @@ class Axis:
 def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
     """Yield values (rad or m) of the joint with the axis u that may move `axis_b` to `axis_a`."""
     if not turns:
-        heights = axis_a.height(u.direction), axis_b.height(u.direction)
-        if heights[0] is not None and heights[1] is not None:
-            yield heights[0] - heights[1]
+        coordinates = (
+            axis_a.nearest_point_coordinate(u.direction),
+            axis_b.nearest_point_coordinate(u.direction),
+        )
+        if coordinates[0] is not None and coordinates[1] is not None:
+            yield coordinates[0] - coordinates[1]
         return
     s, t = axis_a.screw, axis_b.screw
     candidate = angle_from_to(u.direction, t.direction, s.direction)
@@ -305,19 +313,21 @@ def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterat
 
 
 def later_axes(
-    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
+    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference_line: Both[Screw]
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of axes: an axis of A after the joint `via[0]`, and an axis of B after the joint `via[1]`.
 
-    A branch stops after the first axis of A that is not parallel to `reference[0]`.
+    A branch stops after the first axis of A that is not parallel to `reference_line[0]`.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
-        axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
+        axes = _axis(mechanisms[0], e, reference_line[0]), _axis(mechanisms[1], f, reference_line[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, reference[0].direction)) < PARALLEL_TOLERANCE:
-            beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
-            yield from later_axes(mechanisms, (e, f), beyond, screws if axes[0].turns else reference)
+        if np.linalg.norm(np.cross(screws[0].direction, reference_line[0].direction)) < PARALLEL_TOLERANCE:
+            next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
+            yield from later_axes(
+                mechanisms, (e, f), next_bodies, screws if axes[0].turns else reference_line
+            )
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
@@ -325,12 +335,12 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 
     The rotation about this axis is 0 if no other axis determines it. The same holds for the shift along it.
     """
-    firsts = _first_axes((a, b), (None, None), bodies, ())
+    firsts = _first_revolute_axes((a, b), (None, None), bodies, ())
     for (axis_a, axis_b), before, after in firsts:
         lines = axis_a.screw, axis_b.screw
         # If no joint follows this axis, the first axes of other branches determine the pose of B's root.
         # For example, each rotor of a drone has a branch of its own with a single joint.
-        others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
+        others = after or [_with_reference_lines(lines, *pair) for pair, *_ in firsts]
         for start in (axis_b.screw, axis_b.screw.reverse()):
             K = smallest_motion(start, axis_a.screw, turns=True)[0]
             for angle in _candidates(axis_a.screw, [*before, *others], K, turns=True):
@@ -340,7 +350,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 
 
 def root_poses_by_siblings(
-    a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
+    a: Mechanism, b: Mechanism, bodies: Both[int], have_equal_subtrees: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
     """Yield poses of B's root that align up to three joint axes of one body.
 
@@ -357,35 +367,40 @@ def root_poses_by_siblings(
     sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in axes_a]
     rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -sines[i])
     second, others = rest[0], [i for i in rest[1:] if axes_a[i].turns][:1]
-    axes_b = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
+    axes_b = [
+        [(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if have_equal_subtrees(edge, f)] for edge in edges
+    ]
     for f, axis in axes_b[first]:
         lines = u, axis.screw
-        pair_of = partial(_with_reference, lines)
-        beyond = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
-        far = list(later_axes((a, b), (edges[first], f), beyond, lines))
+        with_lines = partial(_with_reference_lines, lines)
+        next_bodies = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
+        later_pairs = list(later_axes((a, b), (edges[first], f), next_bodies, lines))
         for start, (g, other) in product((axis.screw, axis.screw.reverse()), axes_b[second]):
             if g is f:
                 continue
-            pair = pair_of(axes_a[second], other)
-            more = [
-                pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
+            pair = with_lines(axes_a[second], other)
+            other_pairs = [
+                with_lines(axes_a[i], one)
+                for i in others
+                for h, one in axes_b[i]
+                if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
             # The axes after the prismatic joint can determine the shift along u.
             if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
-                led = _next_joints((a, b), (edges[second], g), carried)
-                more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
+                next_joints = _next_joints((a, b), (edges[second], g), carried)
+                other_pairs += [with_lines(_axis(a, e), _axis(b, h)) for e, h in next_joints]
             K = smallest_motion(start, u, turns=True)[0]
             for angle in zero_candidates(u, pair[0], pair[1].transform(K), turns=True):
                 X = screw_motion(u, angle, turns=True) @ K
                 shifts = list(zero_candidates(u, pair[0], pair[1].transform(X), turns=False))
-                for shift in shifts or _candidates(u, [*more, *far], X, turns=False):
+                for shift in shifts or _candidates(u, [*other_pairs, *later_pairs], X, turns=False):
                     yield screw_motion(u, shift, turns=False) @ X
 
 
-def _with_reference(lines: Both[Screw], axis_a: Axis, axis_b: Axis) -> Both[Axis]:
-    return replace(axis_a, reference=lines[0]), replace(axis_b, reference=lines[1])
+def _with_reference_lines(lines: Both[Screw], axis_a: Axis, axis_b: Axis) -> Both[Axis]:
+    return replace(axis_a, reference_line=lines[0]), replace(axis_b, reference_line=lines[1])
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
@@ -398,8 +413,11 @@ def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: 
     ] or [0.0]
 
 
-def _first_axes(
-    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
+def _first_revolute_axes(
+    mechanisms: Both[Mechanism],
+    via: Both[Edge | None],
+    bodies: Both[int],
+    earlier_pairs: tuple[Both[Axis], ...],
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """For each branch of A with each branch of B, return the first revolute axes of both branches.
 
@@ -409,13 +427,19 @@ def _first_axes(
     """
     first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
-        pair, beyond = (
+        pair, next_bodies = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
             (e.other_body(bodies[0]), f.other_body(bodies[1])),
         )
         lines = pair[0].screw, pair[1].screw
-        deeper = [] if pair[0].turns else _first_axes(mechanisms, (e, f), beyond, (*near, pair))
-        first_axes += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
+        deeper = (
+            []
+            if pair[0].turns
+            else _first_revolute_axes(mechanisms, (e, f), next_bodies, (*earlier_pairs, pair))
+        )
+        first_axes += deeper or [
+            (pair, earlier_pairs, list(later_axes(mechanisms, (e, f), next_bodies, lines)))
+        ]
     return first_axes
 
 
@@ -435,9 +459,9 @@ def _next_joints(
             yield e, f
 
 
-def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> Axis:
+def _axis(mechanism: Mechanism, edge: Edge, reference_line: Screw | None = None) -> Axis:
     screw = mechanism.screw(edge)
-    return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
+    return Axis(screw, mechanism.joint(edge).kind.turns, reference_line or screw)
 
 
 #: Function that proposes poses of the next body of B.
@@ -447,7 +471,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 ProposePoses = Callable[[tuple[int, int], EdgePair, FloatArray], Iterable[FloatArray]]
 
 #: For each pair of bodies, the search for an exact match tries at most this number of joint pairs.
-MOST_ASSIGNMENTS = 5000
+MAX_ASSIGNMENTS = 5000
 
 #: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
 VelocityRatios = Mapping[str, tuple[str, float]]
@@ -479,13 +503,13 @@ class SubtreeMatcher:
     ) -> None:
         self.a, self.b, self.joint_matcher, self.tolerance, self.poses = a, b, joint_matcher, tolerance, poses
         self._cache = dict[tuple[int, int, int], list[tuple[FloatArray, _Match | None]]]()
-        self._rules = True
+        self._uses_mimic_rules = True
 
-    def ignore_rules(self) -> None:
-        self._rules = False
+    def ignore_mimic_rules(self) -> None:
+        self._uses_mimic_rules = False
         self._cache.clear()
 
-    def joint_pairs(
+    def exact_joint_pairs(
         self, bodies: tuple[int, int], via: PreviousEdges, X: FloatArray
     ) -> Sequence[EdgePair] | None:
         """Return pairs of the joints at two bodies; None if the bodies' subtrees do not match exactly.
@@ -505,7 +529,7 @@ class SubtreeMatcher:
     ) -> tuple[Sequence[EdgePair], VelocityRatios] | None:
         if not self.joint_matcher.has_same_shape(bodies, via):
             return None
-        for i, j in self.joint_matcher.links(*bodies):
+        for i, j in self.joint_matcher.link_pairs(*bodies):
             if not self.tolerance.holds(*pose_difference(self.a.zero_poses[i], X @ self.b.zero_poses[j])):
                 return None
         named, left_a, left_b = self.joint_matcher.pair_by_name(bodies, via)
@@ -515,7 +539,7 @@ class SubtreeMatcher:
         for e in left_a:
             some = self.joint_matcher.rank_candidates(bodies, e, left_b, X)
             candidates.append([f for f in some if self._axes_coincide(e, f, X)])
-        return self._assign([*(e for e, _ in named), *left_a], candidates, bodies, X, [MOST_ASSIGNMENTS], {})
+        return self._assign([*(e for e, _ in named), *left_a], candidates, bodies, X, [MAX_ASSIGNMENTS], {})
 
     def _assign(
         self,
@@ -548,11 +572,11 @@ class SubtreeMatcher:
         for other, match in cases:
             if self._is_same_case(e, other, X):
                 return match
-        beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
+        next_bodies = e.other_body(bodies[0]), f.other_body(bodies[1])
         match, own = None, self._velocity_ratio(e, f, bodies, X)
-        if self.joint_matcher.has_same_shape(beyond, (e, f)):
-            for there in _distinct(self.poses(beyond, (e, f), X)):
-                found_pairs = self._match_bodies(beyond, (e, f), there)
+        if self.joint_matcher.has_same_shape(next_bodies, (e, f)):
+            for there in _distinct(self.poses(next_bodies, (e, f), X)):
+                found_pairs = self._match_bodies(next_bodies, (e, f), there)
                 ratios = None if found_pairs is None else self._merge_ratios(own, found_pairs[1])
                 if ratios is not None:
                     match = _Match(there, ratios)
@@ -562,7 +586,7 @@ class SubtreeMatcher:
 
     def _velocity_ratio(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> VelocityRatios:
         joints = self.a.joint(e), self.b.joint(f)
-        if not self._rules or not joints[0].kind.has_axis:
+        if not self._uses_mimic_rules or not joints[0].kind.has_axis:
             return {}
         (x, m), (y, n) = (
             (joint.name, 1.0) if (rule := joint.mimic) is None else (rule.mimicked_joint, rule.multiplier)

@@ -39,7 +39,7 @@ from urdfkin.model.mechanisms.mechanism import (
     AlignmentChoices,
     Edge,
     FramePair,
-    JointTransform,
+    FreeJointConversion,
     MatchedJoints,
     Mechanism,
     Screw,
@@ -47,7 +47,7 @@ from urdfkin.model.mechanisms.mechanism import (
     angle_about,
     line_difference,
     nearest_planar_pose,
-    planar_counterpart,
+    out_of_plane_compensation,
     pose_difference,
     screw_motion,
     size_of,
@@ -57,20 +57,20 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
 #: Maximum depth of a tree, in joints, for the recursive search for an exact match.
-MOST_DEPTH = 200
+MAX_EXACT_SEARCH_DEPTH = 200
 #: If several choices at a joint are equally good, the joints after this joint decide.
 #: The matcher compares at most this number of joints on each branch.
 LOOK_AHEAD_DEPTH = 6
 #: Maximum number of poses of B's root from axes that the search for an exact match tries.
 #: The number applies to each pair of first bodies.
-MOST_ROOT_POSES = 48
+MAX_ROOT_POSES = 48
 #: A score with more agreeing links and axes is better.
 #: For equal numbers, a score with a much smaller difference (m) is better.
 #: The smaller difference must be less than this factor times the larger difference.
 BETTER_RATIO = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
-_Choice = TypeVar("_Choice", float, FloatArray)
+_OffsetOrPose = TypeVar("_OffsetOrPose", float, FloatArray)
 #: Number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
@@ -98,16 +98,16 @@ class BodyPair:
         via: The joints of A and of B before the bodies; None at the first bodies.
         previous: Index in `Alignment.steps` of the joint pair before the bodies.
             -1 at the first bodies, in `_score_ahead` and in `_poses_after`.
-        G: (4, 4) product of the motions L at earlier joints.
-        XC: (4, 4) motion of B's body by the root pose, and by earlier zero offsets and conversions.
-            The matcher compares G @ (zero pose of A's link) with XC @ (zero pose of B's link).
+        motion_a: (4, 4) motion G, the product of the motions L at earlier joints.
+        motion_b: (4, 4) motion of B's body by the root pose, and by earlier zero offsets and conversions.
+            The matcher compares motion_a @ (zero pose of A's link) with motion_b @ (zero pose of B's link).
     """
 
     bodies: tuple[int, int]
     via: tuple[Edge | None, Edge | None]
     previous: int
-    G: FloatArray
-    XC: FloatArray
+    motion_a: FloatArray
+    motion_b: FloatArray
 
 
 class MechanismMatcher:
@@ -140,7 +140,7 @@ class MechanismMatcher:
         self.subtree_sizes = _subtree_sizes(a), _subtree_sizes(b)
         self.match_count = 0
         self.exact: SubtreeMatcher | None = None
-        if choices is None and max(*a.depths, *b.depths) <= MOST_DEPTH:
+        if choices is None and max(*a.depths, *b.depths) <= MAX_EXACT_SEARCH_DEPTH:
             self.exact = SubtreeMatcher(a, b, joint_matcher, tolerance, self._poses_after)
 
     # -- first bodies ------------------------------------------------------------------------------
@@ -171,20 +171,20 @@ class MechanismMatcher:
         if self.exact is not None:
             start = self._exact_start(self.exact, bases)
             if start is None and any(joint.mimic for m in (self.a, self.b) for joint in m.tree.joints):
-                self.exact.ignore_rules()
+                self.exact.ignore_mimic_rules()
                 start = self._exact_start(self.exact, bases)
             if start is not None:
                 yield start
         for base in bases:
-            if self._most_matches(base) < self.match_count:
+            if self._match_count_bound(base) < self.match_count:
                 continue
             tried = list[FloatArray]()
-            for X in chain(self._root_poses_by_names(base), self._root_poses_by_axes(base)):
+            for X in chain(self._root_poses_by_links(base), self._root_poses_by_axes(base)):
                 if not any(self.tolerance.holds(*pose_difference(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
 
-    def _most_matches(self, base: tuple[int, int]) -> int:
+    def _match_count_bound(self, base: tuple[int, int]) -> int:
         """Return an upper bound on the number of matches from the bodies `base`.
 
         Two branches with m and n joints have at most min(m, n) joint pairs. The same bound holds for links.
@@ -208,12 +208,12 @@ class MechanismMatcher:
         for base in bases:
             if self.joint_matcher.has_same_shape(base, (None, None)):
                 for X in self._exact_root_poses(base):
-                    if exact.joint_pairs(base, (None, None), X) is not None:
+                    if exact.exact_joint_pairs(base, (None, None), X) is not None:
                         return base, X
         return None
 
     def _exact_root_poses(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        yield from self._root_poses_by_names(base)
+        yield from self._root_poses_by_links(base)
         siblings = root_poses_by_siblings(
             self.a, self.b, base, lambda e, f: self.joint_matcher.have_equal_subtrees(base, e, f)
         )
@@ -222,11 +222,11 @@ class MechanismMatcher:
             for X in chain(siblings, root_poses_by_axes(self.a, self.b, base))
             if self.joint_matcher.all_axes_coincide(base, X)
         )
-        yield from islice(some, MOST_ROOT_POSES)
+        yield from islice(some, MAX_ROOT_POSES)
 
-    def _root_poses_by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
+    def _root_poses_by_links(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         yield IDENTITY
-        for link_a, link_b in self.joint_matcher.links(*base):
+        for link_a, link_b in self.joint_matcher.link_pairs(*base):
             yield self.a.zero_poses[link_a] @ inverse(self.b.zero_poses[link_b])
 
     def _start_bodies(self) -> Iterator[tuple[int, int]]:
@@ -249,7 +249,7 @@ class MechanismMatcher:
             bodies = BodyPair(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, bodies, self._score(bodies)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
-        yield from (bodies.XC for _, bodies, score in scored if not is_better(best, score))
+        yield from (bodies.motion_b for _, bodies, score in scored if not is_better(best, score))
 
     # -- matching ------------------------------------------------------------------------------------
 
@@ -260,8 +260,8 @@ class MechanismMatcher:
             body_pair = stack.pop()
             self._match_links(body_pair, alignment)
             pairs, only_a, only_b = self._joint_pairs(body_pair)
-            alignment.only_a += _joints_beyond(self.a, body_pair.bodies[0], only_a)
-            alignment.only_b += _joints_beyond(self.b, body_pair.bodies[1], only_b)
+            alignment.only_a += _joints_in_subtrees(self.a, body_pair.bodies[0], only_a)
+            alignment.only_b += _joints_in_subtrees(self.b, body_pair.bodies[1], only_b)
             for e, f in pairs:
                 step, next_pair, _ = self._match_joints(
                     body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
@@ -278,16 +278,20 @@ class MechanismMatcher:
 
     def _joint_pairs(self, body_pair: BodyPair) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         if self.exact is not None:
-            pairs = self.exact.joint_pairs(
-                body_pair.bodies, body_pair.via, inverse(body_pair.G) @ body_pair.XC
+            pairs = self.exact.exact_joint_pairs(
+                body_pair.bodies, body_pair.via, inverse(body_pair.motion_a) @ body_pair.motion_b
             )
             if pairs is not None:
                 return pairs, (), ()
-        return self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
+        return self.joint_matcher.pair_joints(
+            body_pair.bodies, body_pair.via, body_pair.motion_a, body_pair.motion_b
+        )
 
-    def _poses_after(self, beyond: tuple[int, int], via: EdgePair, X: FloatArray) -> Iterator[FloatArray]:
+    def _poses_after(
+        self, next_bodies: tuple[int, int], via: EdgePair, X: FloatArray
+    ) -> Iterator[FloatArray]:
         """Yield possible poses of B's next body; see `ProposePoses`."""
-        next_pair = BodyPair(beyond, via, -1, IDENTITY, X)
+        next_pair = BodyPair(next_bodies, via, -1, IDENTITY, X)
         kind, f = motion_type(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
             t, turns = self.b.screw(f), kind == "turns"
@@ -295,26 +299,30 @@ class MechanismMatcher:
                 yield X @ screw_motion(t, offset, turns=turns) if offset else X
             return
         zero_poses = self.a.zero_poses[via[0].joint + 1], self.b.zero_poses[f.joint + 1]
-        plane = planar_counterpart(inverse(X @ zero_poses[1]) @ zero_poses[0]) if kind == "planar" else None
-        for N in self._motions_after(
-            next_pair, zero_poses[0], zero_poses[1], plane, self._exact_root_poses(beyond)
+        compensation = (
+            out_of_plane_compensation(inverse(X @ zero_poses[1]) @ zero_poses[0])
+            if kind == "planar"
+            else None
+        )
+        for N in self._motion_candidates(
+            next_pair, zero_poses[0], zero_poses[1], compensation, self._exact_root_poses(next_bodies)
         ):
             yield zero_poses[0] @ N @ inverse(zero_poses[1])
 
     def _match_links(self, body_pair: BodyPair, alignment: Alignment) -> None:
-        pairs = self._all_links(body_pair)
+        pairs = self._find_link_pairs(body_pair)
         if (other := self._pair_of_tools(body_pair, pairs)) is not None:
             alignment.frames.append(other)
         for link_a, link_b in pairs:
             zero_pose = self.a.zero_poses[link_a]
-            pose_a, pose_b = body_pair.G @ zero_pose, body_pair.XC @ self.b.zero_poses[link_b]
+            pose_a, pose_b = body_pair.motion_a @ zero_pose, body_pair.motion_b @ self.b.zero_poses[link_b]
             angle, distance = pose_difference(pose_a, pose_b)
             end = IDENTITY
             if self.tolerance.holds(angle, distance):
                 angle = distance = 0.0
                 alignment.match_count += 1
             else:
-                end = inverse(body_pair.G) @ pose_b @ inverse(zero_pose)
+                end = inverse(body_pair.motion_a) @ pose_b @ inverse(zero_pose)
                 alignment.max_difference = max(alignment.max_difference, angle * self.size + distance)
             alignment.frames.append(
                 FramePair(link_a, link_b, body_pair.previous, zero_pose, end, angle, distance)
@@ -326,45 +334,47 @@ class MechanismMatcher:
         Each label occurs in one model only.
         The result is None if no such links exist, or if other links of the bodies are matched.
         """
-        links_a, links_b = self._own_links(body_pair)
+        links_a, links_b = self._unshared_links(body_pair)
         if matched or not links_a or not links_b:
             return None
         zero_pose = self.a.zero_poses[links_a[0]]
-        tool = inverse(body_pair.G @ zero_pose) @ body_pair.XC @ self.b.zero_poses[links_b[0]]
+        tool = inverse(body_pair.motion_a @ zero_pose) @ body_pair.motion_b @ self.b.zero_poses[links_b[0]]
         return FramePair(links_a[0], links_b[0], body_pair.previous, zero_pose, IDENTITY, 0.0, 0.0, tool)
 
-    def _all_links(self, body_pair: BodyPair) -> list[tuple[int, int]]:
-        pairs = list(self.joint_matcher.links(*body_pair.bodies))
+    def _find_link_pairs(self, body_pair: BodyPair) -> list[tuple[int, int]]:
+        pairs = list(self.joint_matcher.link_pairs(*body_pair.bodies))
         taken = {j for _, j in pairs}
-        links_a, links_b = self._own_links(body_pair)
+        links_a, links_b = self._unshared_links(body_pair)
         for i in links_a:
-            pose_a = body_pair.G @ self.a.zero_poses[i]
+            pose_a = body_pair.motion_a @ self.a.zero_poses[i]
             for j in links_b:
                 if j not in taken and self.tolerance.holds(
-                    *pose_difference(pose_a, body_pair.XC @ self.b.zero_poses[j])
+                    *pose_difference(pose_a, body_pair.motion_b @ self.b.zero_poses[j])
                 ):
                     pairs.append((i, j))
                     taken.add(j)
                     break
         return pairs
 
-    def _own_links(self, body_pair: BodyPair) -> tuple[list[int], list[int]]:
+    def _unshared_links(self, body_pair: BodyPair) -> tuple[list[int], list[int]]:
         names_a, names_b = self.a.labels, self.b.labels
         links_a = [i for i in self.a.bodies[body_pair.bodies[0]] if names_a[i] not in names_b]
         return links_a, [j for j in self.b.bodies[body_pair.bodies[1]] if names_b[j] not in names_a]
 
     def _match_joints(
-        self, body_pair: BodyPair, e: Edge, f: Edge, index: int, depth: int
+        self, body_pair: BodyPair, e: Edge, f: Edge, step_index: int, depth: int
     ) -> tuple[MatchedJoints, BodyPair, Score]:
         kinds = motion_type(self.a.joint(e).kind), motion_type(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == body_pair.bodies[0], f.outer == body_pair.bodies[1]
         bodies = e.other_body(body_pair.bodies[0]), f.other_body(body_pair.bodies[1])
-        next_pair = BodyPair(bodies, via, index, body_pair.G, body_pair.XC)
+        next_pair = BodyPair(bodies, via, step_index, body_pair.motion_a, body_pair.motion_b)
         if kinds[0] != kinds[1]:
             return self._match_unlike(body_pair, via, kinds, backwards), next_pair, (0, 0.0)
         if kinds[0] in ("turns", "prismatic"):
-            return self._match_axes(body_pair, next_pair, backwards, depth, turns=kinds[0] == "turns")
+            return self._match_joints_with_axes(
+                body_pair, next_pair, backwards, depth, turns=kinds[0] == "turns"
+            )
         return self._match_free_joints(body_pair, next_pair, backwards, depth, kinds[0])
 
     def _match_unlike(
@@ -377,7 +387,7 @@ class MechanismMatcher:
         kind_difference = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if kind_difference == "a":
             axis = _outwards(self.b.screw(via[1]), backwards[1]).transform(
-                inverse(body_pair.G) @ body_pair.XC
+                inverse(body_pair.motion_a) @ body_pair.motion_b
             )
         else:
             axis = _outwards(self.a.screw(via[0]), backwards[0])
@@ -402,7 +412,7 @@ class MechanismMatcher:
     ) -> tuple[MatchedJoints, BodyPair, Score]:
         e, f = _require_edges(next_pair.via)
         zero_poses = self.a.zero_poses[e.joint + 1], self.b.zero_poses[f.joint + 1]
-        pose_a, pose_b = body_pair.G @ zero_poses[0], body_pair.XC @ zero_poses[1]
+        pose_a, pose_b = body_pair.motion_a @ zero_poses[0], body_pair.motion_b @ zero_poses[1]
         axis, back = Screw(zero_poses[0][:3, 2], zero_poses[0][:3, 3]), backwards[0] != backwards[1]
         step = MatchedJoints(
             e.joint, f.joint, kind, body_pair.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0
@@ -414,8 +424,13 @@ class MechanismMatcher:
         else:
             K, tilt, shift = _align_normals(pose_a, pose_b) if kind == "planar" else (IDENTITY, 0.0, 0.0)
         if not self.tolerance.holds(tilt, shift):
-            step = replace(step, before=inverse(body_pair.G) @ K @ body_pair.G, tilt=tilt, shift=shift)
-            next_pair, pose_a = replace(next_pair, G=K @ body_pair.G), K @ pose_a
+            step = replace(
+                step,
+                constant_motion=inverse(body_pair.motion_a) @ K @ body_pair.motion_a,
+                tilt=tilt,
+                shift=shift,
+            )
+            next_pair, pose_a = replace(next_pair, motion_a=K @ body_pair.motion_a), K @ pose_a
         if as_written:
             return replace(step, kind_difference="kind" if back else ""), next_pair, (0, 0.0)
         M = inverse(pose_b) @ pose_a
@@ -425,11 +440,11 @@ class MechanismMatcher:
         elif exact is not None:
             tried = [inverse(pose_a) @ exact @ zero_poses[1]]
         else:
-            plane = planar_counterpart(M) if kind == "planar" else None
-            tried = self._motions_after(
-                next_pair, pose_a, zero_poses[1], plane, self._root_poses_by_axes(next_pair.bodies)
+            compensation = out_of_plane_compensation(M) if kind == "planar" else None
+            tried = self._motion_candidates(
+                next_pair, pose_a, zero_poses[1], compensation, self._root_poses_by_axes(next_pair.bodies)
             )
-        body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
+        body_pairs = ((N, replace(next_pair, motion_b=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
         N, moved, score = self._best(body_pairs, depth)
         # P_a and P_b are the joint's poses in A and B.
         # P_b = M P_a N.
@@ -441,32 +456,32 @@ class MechanismMatcher:
         )
         if before is IDENTITY and behind is IDENTITY and not back:
             return step, next_pair, score
-        return replace(step, conversion=JointTransform(before, behind, back)), moved, score
+        return replace(step, conversion=FreeJointConversion(before, behind, back)), moved, score
 
-    def _motions_after(
+    def _motion_candidates(
         self,
         next_pair: BodyPair,
         pose_a: FloatArray,
         zero_pose_b: FloatArray,
-        plane: FloatArray | None,
-        poses_after: Iterable[FloatArray],
+        compensation: FloatArray | None,
+        next_poses: Iterable[FloatArray],
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N in P_b = M P_a N; see the module `mechanism`.
 
-        `plane` is one possible N of a planar joint, and None for a floating joint.
-        `pose_a` includes the motion G.
+        `compensation` is one possible N of a planar joint, and None for a floating joint.
+        `pose_a` includes `motion_a`.
         """
-        yield IDENTITY if plane is None else plane
-        candidates = [next_pair.XC]
+        yield IDENTITY if compensation is None else compensation
+        candidates = [next_pair.motion_b]
         candidates += [
-            next_pair.G @ self.a.zero_poses[i] @ inverse(self.b.zero_poses[j])
-            for i, j in self.joint_matcher.links(*next_pair.bodies)
+            next_pair.motion_a @ self.a.zero_poses[i] @ inverse(self.b.zero_poses[j])
+            for i, j in self.joint_matcher.link_pairs(*next_pair.bodies)
         ]
-        for XC in chain(candidates, (next_pair.G @ X for X in poses_after)):
-            N = inverse(pose_a) @ XC @ zero_pose_b
-            yield N if plane is None else plane @ nearest_planar_pose(inverse(plane) @ N)
+        for motion_b in chain(candidates, (next_pair.motion_a @ X for X in next_poses)):
+            N = inverse(pose_a) @ motion_b @ zero_pose_b
+            yield N if compensation is None else compensation @ nearest_planar_pose(inverse(compensation) @ N)
 
-    def _match_axes(
+    def _match_joints_with_axes(
         self,
         body_pair: BodyPair,
         next_pair: BodyPair,
@@ -476,41 +491,51 @@ class MechanismMatcher:
         turns: bool,
     ) -> tuple[MatchedJoints, BodyPair, Score]:
         e, f = _require_edges(next_pair.via)
-        s = _outwards(self.a.screw(e), backwards[0])
-        t = _outwards(self.b.screw(f), backwards[1])
-        start, end = s.transform(body_pair.G), t.transform(body_pair.XC)
+        screw_a = _outwards(self.a.screw(e), backwards[0])
+        screw_b = _outwards(self.b.screw(f), backwards[1])
+        start, end = screw_a.transform(body_pair.motion_a), screw_b.transform(body_pair.motion_b)
         sense, zero = self._zero_choice(self.a.joint(e).name)
         sense = sense or (-1 if start.direction @ end.direction < 0.0 else 1)
         if sense < 0:
             end = end.reverse()
         K, tilt, shift = smallest_motion(start, end, turns=turns)
         kind = "turns" if turns else "prismatic"
-        step = MatchedJoints(e.joint, f.joint, kind, body_pair.previous, sense, 0.0, IDENTITY, s, s, 0.0, 0.0)
+        step = MatchedJoints(
+            e.joint, f.joint, kind, body_pair.previous, sense, 0.0, IDENTITY, screw_a, screw_a, 0.0, 0.0
+        )
         if self.tolerance.holds(tilt, shift):
             exact = self._exact_pose(body_pair, next_pair)
             if exact is not None:
-                T = inverse(body_pair.XC) @ exact
-                zero = angle_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
-                zero = 0.0 if self.tolerance.holds(*pose_difference(body_pair.XC, exact)) else zero
-            offset, next_pair, score = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
+                T = inverse(body_pair.motion_b) @ exact
+                zero = (
+                    angle_about(screw_b.direction, T[:3, :3])
+                    if turns
+                    else float(screw_b.direction @ T[:3, 3])
+                )
+                zero = 0.0 if self.tolerance.holds(*pose_difference(body_pair.motion_b, exact)) else zero
+            offset, next_pair, score = self._best_zero(
+                next_pair, body_pair.motion_a, screw_b, turns, zero, depth
+            )
             return replace(step, offset=offset), next_pair, score
         # The motion K moves A's axis to B's axis.
         # Either K displaces the axis and all later bodies of B, or K displaces only the axis.
-        step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.G)
-        with_bodies = self._best_zero(next_pair, K @ body_pair.G, t, turns, zero, depth)
+        step, back = replace(step, tilt=tilt, shift=shift), inverse(body_pair.motion_a)
+        with_bodies = self._best_zero(next_pair, K @ body_pair.motion_a, screw_b, turns, zero, depth)
         if depth == LOOK_AHEAD_DEPTH:
-            alone = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
+            alone = self._best_zero(next_pair, body_pair.motion_a, screw_b, turns, zero, depth)
             if is_better(self._score(alone[1]), self._score(with_bodies[1])):
                 return replace(step, offset=alone[0], axis_b=end.transform(back)), *alone[1:]
-        return replace(step, offset=with_bodies[0], before=back @ K @ body_pair.G), *with_bodies[1:]
+        return replace(
+            step, offset=with_bodies[0], constant_motion=back @ K @ body_pair.motion_a
+        ), *with_bodies[1:]
 
     def _exact_pose(self, body_pair: BodyPair, next_pair: BodyPair) -> FloatArray | None:
         if self.exact is None:
             return None
         X = self.exact.pose_after(
-            *_require_edges(next_pair.via), body_pair.bodies, inverse(body_pair.G) @ body_pair.XC
+            *_require_edges(next_pair.via), body_pair.bodies, inverse(body_pair.motion_a) @ body_pair.motion_b
         )
-        return None if X is None else body_pair.G @ X
+        return None if X is None else body_pair.motion_a @ X
 
     # -- zero offsets ------------------------------------------------------------------------------
 
@@ -522,37 +547,57 @@ class MechanismMatcher:
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
-        self, next_pair: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
+        self,
+        next_pair: BodyPair,
+        motion_a: FloatArray,
+        screw_b: Screw,
+        turns: bool,
+        zero: float | None,
+        depth: int,
     ) -> tuple[float, BodyPair, Score]:
-        offsets = self._offsets(next_pair, G, t, turns) if zero is None else (zero,)
+        offsets = self._offsets(next_pair, motion_a, screw_b, turns) if zero is None else (zero,)
         moved = (
-            (offset, next_pair.XC @ screw_motion(t, offset, turns=turns) if offset else next_pair.XC)
+            (
+                offset,
+                next_pair.motion_b @ screw_motion(screw_b, offset, turns=turns)
+                if offset
+                else next_pair.motion_b,
+            )
             for offset in offsets
         )
-        return self._best(((offset, replace(next_pair, G=G, XC=XC)) for offset, XC in moved), depth)
+        return self._best(
+            (
+                (offset, replace(next_pair, motion_a=motion_a, motion_b=motion_b))
+                for offset, motion_b in moved
+            ),
+            depth,
+        )
 
     def _best(
-        self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
-    ) -> tuple[_Choice, BodyPair, Score]:
+        self, choices: Iterable[tuple[_OffsetOrPose, BodyPair]], depth: int
+    ) -> tuple[_OffsetOrPose, BodyPair, Score]:
         """Return the choice for which most links and axes agree.
 
         Later joints decide between equally good choices. For example, perpendicular axes that intersect
         allow two poses of B, so a third axis decides.
         """
-        scored = list[tuple[_Choice, BodyPair, Score]]()
+        scored = list[tuple[_OffsetOrPose, BodyPair, Score]]()
         for choice, body_pair in choices:
-            if any(self.tolerance.holds(*pose_difference(known.XC, body_pair.XC)) for _, known, _ in scored):
+            if any(
+                self.tolerance.holds(*pose_difference(known.motion_b, body_pair.motion_b))
+                for _, known, _ in scored
+            ):
                 continue
             score = self._score(body_pair)
             scored.append((choice, body_pair, score))
             # If all axes and links agree, no other choice can agree better.
-            if not score[1] and self.joint_matcher.links(*body_pair.bodies):
+            if not score[1] and self.joint_matcher.link_pairs(*body_pair.bodies):
                 return scored[-1]
         best = _best_of(scored)
         equal = [one for one in scored if not is_better(best[2], one[2])]
         if not depth or self.look_ahead.remaining <= 0 or (len(equal) == 1 and depth == LOOK_AHEAD_DEPTH):
             return best
-        scored_ahead = list[tuple[_Choice, BodyPair, Score]]()
+        scored_ahead = list[tuple[_OffsetOrPose, BodyPair, Score]]()
         for choice, body_pair, score in equal:
             scored_ahead.append((choice, body_pair, self._score_ahead(body_pair, score, depth)))
             if not scored_ahead[-1][2][1]:
@@ -560,18 +605,26 @@ class MechanismMatcher:
         return _best_of(scored_ahead)
 
     def _score_ahead(self, body_pair: BodyPair, own: Score, depth: int) -> Score:
-        pairs = self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)[0]
+        pairs = self.joint_matcher.pair_joints(
+            body_pair.bodies, body_pair.via, body_pair.motion_a, body_pair.motion_b
+        )[0]
         self.look_ahead.remaining -= len(pairs)
         scores = [own, *(self._match_joints(body_pair, e, f, -1, depth - 1)[2] for e, f in pairs)]
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
     def _score(self, body_pair: BodyPair) -> Score:
         differences = [
-            pose_difference(body_pair.G @ self.a.zero_poses[i], body_pair.XC @ self.b.zero_poses[j])
-            for i, j in self.joint_matcher.links(*body_pair.bodies)
+            pose_difference(
+                body_pair.motion_a @ self.a.zero_poses[i], body_pair.motion_b @ self.b.zero_poses[j]
+            )
+            for i, j in self.joint_matcher.link_pairs(*body_pair.bodies)
         ]
-        pairs, _, _ = self.joint_matcher.edges(body_pair.bodies, body_pair.via, body_pair.G, body_pair.XC)
-        differences += [self.joint_matcher.mismatch(e, f, body_pair.G, body_pair.XC) for e, f in pairs]
+        pairs, _, _ = self.joint_matcher.pair_joints(
+            body_pair.bodies, body_pair.via, body_pair.motion_a, body_pair.motion_b
+        )
+        differences += [
+            self.joint_matcher.mismatch(e, f, body_pair.motion_a, body_pair.motion_b) for e, f in pairs
+        ]
         wrong = [
             angle * self.size + shift
             for angle, shift in differences
@@ -579,19 +632,23 @@ class MechanismMatcher:
         ]
         return len(differences) - len(wrong), max(wrong, default=0.0)
 
-    def _offsets(self, next_pair: BodyPair, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
+    def _offsets(
+        self, next_pair: BodyPair, motion_a: FloatArray, screw_b: Screw, turns: bool
+    ) -> Iterator[float]:
         yield 0.0
-        u = t.transform(next_pair.XC)
-        for i, j in self.joint_matcher.links(*next_pair.bodies):
-            pose_a, pose_b = G @ self.a.zero_poses[i], next_pair.XC @ self.b.zero_poses[j]
+        u = screw_b.transform(next_pair.motion_b)
+        for i, j in self.joint_matcher.link_pairs(*next_pair.bodies):
+            pose_a, pose_b = motion_a @ self.a.zero_poses[i], next_pair.motion_b @ self.b.zero_poses[j]
             if turns:
                 yield angle_about(u.direction, pose_a[:3, :3] @ pose_b[:3, :3].T)
             else:
                 yield float(u.direction @ (pose_a[:3, 3] - pose_b[:3, 3]))
         for axis_a, axis_b in later_axes(
-            (self.a, self.b), next_pair.via, next_pair.bodies, (u.transform(inverse(G)), t)
+            (self.a, self.b), next_pair.via, next_pair.bodies, (u.transform(inverse(motion_a)), screw_b)
         ):
-            yield from zero_candidates(u, axis_a.transform(G), axis_b.transform(next_pair.XC), turns)
+            yield from zero_candidates(
+                u, axis_a.transform(motion_a), axis_b.transform(next_pair.motion_b), turns
+            )
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
@@ -609,7 +666,9 @@ def _find_shared_body(one: Mechanism, other: Mechanism) -> int | None:
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
-def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice, BodyPair, Score]:
+def _best_of(
+    scored: Sequence[tuple[_OffsetOrPose, BodyPair, Score]],
+) -> tuple[_OffsetOrPose, BodyPair, Score]:
     best = scored[0]
     for one in scored[1:]:
         best = one if is_better(one[2], best[2]) else best
@@ -631,13 +690,17 @@ def _require_edges(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
     return e, f
 
 
-def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
+def _joints_in_subtrees(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
     joints, stack = [], [(body, edge) for edge in edges]
     while stack:
         current, edge = stack.pop()
         joints.append(edge.joint)
-        beyond = edge.other_body(current)
-        stack += [(beyond, other) for other in mechanism.edges_by_body[beyond] if other is not edge]
+        next_body = edge.other_body(current)
+        stack += [
+            (next_body, next_edge)
+            for next_edge in mechanism.edges_by_body[next_body]
+            if next_edge is not edge
+        ]
     return joints
 
 
@@ -655,14 +718,14 @@ def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, 
 
 #: Maximum number of orders that are tried for each run of consecutive joints of B.
 #: Five prismatic joints have 120 orders.
-MOST_ORDERS = 120
+MAX_ORDERS = 120
 #: Maximum number of later joint pairs that a search compares; see `LookAhead`.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
-MOST_LOOK_AHEAD = 2000
+MAX_LOOK_AHEAD_PAIRS = 2000
 #: Larger angle tolerances (rad), tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 #: Maximum number of attempts to exchange the partners of two joint pairs.
-MOST_EXCHANGED = 12
+MAX_EXCHANGES = 12
 
 
 def align(
@@ -673,7 +736,7 @@ def align(
         for order in choices.orders:
             b = b.reorder(order)
         return _best_alignment(a, b, name_map, choices)
-    best = _best_alignment(a, b, name_map, None, LookAhead(MOST_LOOK_AHEAD))
+    best = _best_alignment(a, b, name_map, None, LookAhead(MAX_LOOK_AHEAD_PAIRS))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
@@ -684,7 +747,9 @@ def align(
             candidate = _best_alignment(a, other, name_map, None)
             if is_better(candidate.score, best.score):
                 best = candidate
-    return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map))
+    return _with_zeros_by_mimic_rules(
+        _with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map)
+    )
 
 
 def _orders_to_try(
@@ -692,7 +757,7 @@ def _orders_to_try(
 ) -> Iterator[Sequence[str]]:
     called = {name_map.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
-        yield from islice(orders, MOST_ORDERS)
+        yield from islice(orders, MAX_ORDERS)
         return
     named = sorted(run, key=called.__getitem__)
     if list(run) == named:
@@ -701,8 +766,8 @@ def _orders_to_try(
     yield from (order for order in others if b.allows_order(order, tolerance_of(a, b)))
 
 
-def _with_zeros_by_rules(best: Alignment) -> Alignment:
-    zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
+def _with_zeros_by_mimic_rules(best: Alignment) -> Alignment:
+    zeros = zeros_by_mimic_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
     choices = best.choices
@@ -725,10 +790,12 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
     # If a joint exists in one model only, no exchange of pairs makes the two models agree.
     if best.only_a or best.only_b:
         return best
-    tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)
-    while (pairs := next((one for one in best.exchangeable(name_map) if one not in tried), None)) is not None:
+    tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MAX_LOOK_AHEAD_PAIRS)
+    while (
+        pairs := next((one for one in best.exchangeable_pairs(name_map) if one not in tried), None)
+    ) is not None:
         tried.add(pairs)
-        if len(tried) > MOST_EXCHANGED:
+        if len(tried) > MAX_EXCHANGES:
             break
         joints = best.a.tree.joints, best.b.tree.joints
         (a, b), (c, d) = pairs
@@ -744,7 +811,12 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
 
     If all axes differ slightly, no axes agree within the normal tolerance.
     """
-    a, b, (least, most), look_ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_LOOK_AHEAD)
+    a, b, (least, most), look_ahead = (
+        best.a,
+        best.b,
+        best.inner_difference_range,
+        LookAhead(MAX_LOOK_AHEAD_PAIRS),
+    )
     size = size_of(a, b)
     for angle in LARGER_TOLERANCES:
         if not least < angle * size < BETTER_RATIO * most:
@@ -752,10 +824,10 @@ def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Ali
         tolerance = Tolerance(angle, angle * size)
         rough = _best_alignment(a, b, name_map, None, look_ahead, tolerance, best.base)
         unmatched = [(len(one.only_a), len(one.only_b)) for one in (rough, best)]
-        if rough.inner_differences[1] or unmatched[0] != unmatched[1]:
+        if rough.inner_difference_range[1] or unmatched[0] != unmatched[1]:
             continue
         exact = _best_alignment(a, b, rough.names, rough.choices)
-        return exact if exact.inner_differences[1] < BETTER_RATIO * most else best
+        return exact if exact.inner_difference_range[1] < BETTER_RATIO * most else best
     return best
 
 
@@ -780,11 +852,11 @@ FULL_TURNS = (0, 1, -1)
 #: Allowed difference between a computed zero offset and the zero offset of a mimic rule,
 #: as a multiple of the angle tolerance. A zero offset that is computed from the axes of the joint
 #: and of a later joint is inexact if the two axes are nearly the same line.
-OFFSET_FACTOR = 1e4
+OFFSET_TOLERANCE_FACTOR = 1e4
 
 
 @dataclass(frozen=True, slots=True)
-class _Rule:
+class _RulePair:
     """The mimic rules of two matched joints.
 
         x, y:             coordinates of A and B
@@ -794,80 +866,90 @@ class _Rule:
         alpha, beta:      y = alpha x + beta
 
     Attributes:
-        slope: s m
-        constant: s c
+        slope_a: s m
+        constant_a: s c
+        slope_b: n
+        constant_b: d
         offset: o
-        free: Whether o can have any value, because no later link or axis determines o.
+        is_free: Whether o can have any value, because no later link or axis determines o.
         has_effect: Whether the joint moves matched links or later axes.
     """
 
     step: int
-    slope: float
-    constant: float
-    n: float
-    d: float
+    slope_a: float
+    constant_a: float
+    slope_b: float
+    constant_b: float
     offset: float
     turns: bool
-    free: bool
+    is_free: bool
     has_effect: bool
 
-    def beta_for(self, turn: int) -> float:
+    def beta_with_turns(self, turn: int) -> float:
         """Return beta for the zero offset o + 2 pi `turn`."""
-        return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
+        return (self.constant_a + self.offset + 2.0 * math.pi * turn - self.constant_b) / self.slope_b
 
-    def offset_for(self, beta: float) -> float:
+    def offset_from_beta(self, beta: float) -> float:
         """Return o for a given beta."""
-        return self.n * beta + self.d - self.constant
+        return self.slope_b * beta + self.constant_b - self.constant_a
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
         difference = offset - self.offset
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
-        return self.free or abs(difference) <= OFFSET_FACTOR * tolerance.angle * max(1.0, abs(offset))
+        return self.is_free or abs(difference) <= OFFSET_TOLERANCE_FACTOR * tolerance.angle * max(
+            1.0, abs(offset)
+        )
 
 
-def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
+def zeros_by_mimic_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
     """Return new zero offsets that fit the mimic rules.
 
     The keys are A's joint names, the values are signs and zero offsets (rad or m).
     """
     zeros = dict[str, tuple[int, float]]()
-    for rules in _groups(alignment):
-        alphas = [rule.slope / rule.n for rule in rules if rule.n]
+    for rules in _group_rule_pairs(alignment):
+        alphas = [rule.slope_a / rule.slope_b for rule in rules if rule.slope_b]
         # Rules of a joint pair: y = alpha x + beta, with the coordinates x of A and y of B.
         # Only the joint pairs with the most frequent alpha get a new zero offset.
         alpha = max(
-            alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
+            alphas, key=lambda one: sum(_are_close(one, other, tolerance) for other in alphas), default=0.0
         )
-        fit = [rule for rule in rules if _near(rule.slope, rule.n * alpha, tolerance)]
-        some = sorted((rule for rule in fit if rule.n), key=lambda rule: (rule.free, not rule.has_effect))
-        some = [rule for rule in some if rule.free == some[0].free]
-        betas = [rule.beta_for(turn) for rule in some for turn in (FULL_TURNS if rule.turns else (0,))]
+        fit = [rule for rule in rules if _are_close(rule.slope_a, rule.slope_b * alpha, tolerance)]
+        some = sorted(
+            (rule for rule in fit if rule.slope_b), key=lambda rule: (rule.is_free, not rule.has_effect)
+        )
+        some = [rule for rule in some if rule.is_free == some[0].is_free]
+        betas = [rule.beta_with_turns(turn) for rule in some for turn in (FULL_TURNS if rule.turns else (0,))]
         if not betas:
             continue
-        beta = max(betas, key=lambda one: sum(rule.allows(rule.offset_for(one), tolerance) for rule in fit))
+        beta = max(
+            betas, key=lambda one: sum(rule.allows(rule.offset_from_beta(one), tolerance) for rule in fit)
+        )
         for rule in fit:
-            offset = rule.offset_for(beta)
-            if rule.allows(offset, tolerance) and not _near(offset, rule.offset, tolerance):
+            offset = rule.offset_from_beta(beta)
+            if rule.allows(offset, tolerance) and not _are_close(offset, rule.offset, tolerance):
                 step = alignment.steps[rule.step]
                 zeros[alignment.a.tree.joints[step.a].name] = step.sense, offset
     return zeros
 
 
-def _near(x: float, y: float, tolerance: Tolerance) -> bool:
+def _are_close(x: float, y: float, tolerance: Tolerance) -> bool:
     return abs(x - y) <= 0.5 * tolerance.angle * max(1.0, abs(x), abs(y))
 
 
-def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
-    groups = dict[tuple[str, str], list[_Rule]]()
+def _group_rule_pairs(alignment: Alignment) -> Iterator[list[_RulePair]]:
+    groups = dict[tuple[str, str], list[_RulePair]]()
     for i, step in enumerate(alignment.steps):
         if step.kind_difference or step.kind not in ("turns", "prismatic"):
             continue
         x, m, c = _as_rule(alignment.a.tree.joints[step.a])
         y, n, d = _as_rule(alignment.b.tree.joints[step.b])
         slope, constant = step.sense * m, step.sense * c
-        determined, has_effect = _is_determined(alignment, i)
-        rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, has_effect)
+        determined, has_effect = _find_effects(alignment, i)
+        rule = _RulePair(
+            i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, has_effect
+        )
         groups.setdefault((x, y), []).append(rule)
     yield from (rules for rules in groups.values() if len(rules) > 1)
 
@@ -877,10 +959,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
     return (joint.name, 1.0, 0.0) if rule is None else (rule.mimicked_joint, rule.multiplier, rule.offset)
 
 
-def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
+def _find_effects(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether later links or axes determine the zero offset of joint pair i.
 
-    The second result is the value of `_Rule.has_effect`.
+    The second result is the value of `_RulePair.has_effect`.
     """
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
@@ -890,7 +972,7 @@ def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
                 step.differs
                 or step.kind_difference
                 or step.conversion
-                or not _keeps_axis(alignment.steps[i], step)
+                or not _keeps_axis_fixed(alignment.steps[i], step)
             ):
                 return True, True
             behind.add(k)
@@ -899,7 +981,7 @@ def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
     return determined, any(frame.tool is IDENTITY for frame in carried)
 
 
-def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
+def _keeps_axis_fixed(one: MatchedJoints, other: MatchedJoints) -> bool:
     """Return whether the axis of `other` stays fixed when joint `one` moves."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"

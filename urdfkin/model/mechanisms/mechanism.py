@@ -141,7 +141,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointTransform:
+class FreeJointConversion:
     """Conversion of a planar or floating joint.
 
     The module docstring defines M and N under *Planar and floating joints*.
@@ -166,10 +166,10 @@ class JointTransform:
 
         The method checks two poses P.
         """
-        if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
+        if not all(is_joint_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _TEST_COORDINATES)
-        return all(is_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
+        return all(is_joint_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
 
 
 def pose_of(kind: JointKind, coordinates: FloatArray) -> FloatArray:
@@ -201,7 +201,7 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
 
 
-def is_pose(kind: JointKind, T: FloatArray) -> bool:
+def is_joint_pose(kind: JointKind, T: FloatArray) -> bool:
     tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
     if not is_rigid(T, tolerance):
         return False
@@ -217,7 +217,7 @@ def nearest_planar_pose(P: FloatArray) -> FloatArray:
     return pose_of(JointKind.PLANAR, coordinates_of(JointKind.PLANAR, P))
 
 
-def planar_counterpart(M: FloatArray) -> FloatArray:
+def out_of_plane_compensation(M: FloatArray) -> FloatArray:
     """Return a motion N for which M P N is planar for every planar pose P.
 
     The rotation of M must map the plane's normal z to z or -z.
@@ -402,7 +402,7 @@ class Mechanism:
         return max(self.lengths)
 
     @cached_property
-    def rounding(self) -> float:
+    def rotation_rounding(self) -> float:
         """Rounding error (rad) of the links' rotations.
 
         The error (m) of the links' positions is this error times `size`.
@@ -412,7 +412,7 @@ class Mechanism:
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
-            j.tilt for j in self.tree.joints
+            j.pinocchio_tilt for j in self.tree.joints
         )
 
 
@@ -429,7 +429,7 @@ class Tolerance:
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
     """Return the tolerance for rounding errors."""
-    k = a.rounding + b.rounding
+    k = a.rotation_rounding + b.rotation_rounding
     return Tolerance(k, k * size_of(a, b))
 
 
@@ -475,7 +475,7 @@ class MatchedJoints:
         previous: Index of the previous joint pair on the path from the base, or -1.
         sense: Sign, 1 or -1.
         offset: Zero offset, rad or m.
-        before: Rigid motion L (4, 4); B's joint moves the bodies after it by L exp(S' t').
+        constant_motion: Rigid motion L (4, 4); B's joint moves the bodies after it by L exp(S' t').
         axis_a: Screw S; exp(S t) moves the bodies after the joint.
             If A's joint is fixed, `axis_a` is the screw of B's joint.
         axis_b: B's screw S' in A's root frame. If S' = S, `axis_b` is the same object as `axis_a`.
@@ -506,13 +506,13 @@ class MatchedJoints:
     previous: int
     sense: int
     offset: float
-    before: FloatArray
+    constant_motion: FloatArray
     axis_a: Screw
     axis_b: Screw
     tilt: float
     shift: float
     kind_difference: str = ""
-    conversion: JointTransform | None = None
+    conversion: FreeJointConversion | None = None
 
     @property
     def differs(self) -> bool:
@@ -528,7 +528,7 @@ class FramePair:
         b: Index of B's link.
         previous: Index of the last joint pair on the path to the links, or -1.
         zero_pose: (4, 4) pose of A's link in the zero configuration.
-        end: Rigid motion L (4, 4) after the last joint; the module docstring defines L.
+        constant_motion: Rigid motion L (4, 4) after the last joint; the module docstring defines L.
         tilt: Angle between the frames, rad.
         shift: Distance between the origins, m.
         tool: (4, 4) pose of B's link in the frame of A's link, for different end-effector frames.
@@ -539,18 +539,18 @@ class FramePair:
     b: int
     previous: int
     zero_pose: FloatArray
-    end: FloatArray
+    constant_motion: FloatArray
     tilt: float
     shift: float
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
-    def as_tool(self) -> FramePair:
+    def move_difference_to_tool(self) -> FramePair:
         """Return a copy with the frames' difference in `tool`.
 
-        In the copy, `end` is the identity, and `tilt` and `shift` are 0.
+        In the copy, `constant_motion` is the identity, and `tilt` and `shift` are 0.
         """
-        tool = inverse(self.zero_pose) @ self.end @ self.zero_pose
-        return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
+        tool = inverse(self.zero_pose) @ self.constant_motion @ self.zero_pose
+        return replace(self, constant_motion=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
     @property
     def differs(self) -> bool:
@@ -597,7 +597,7 @@ class Alignment:
         return self.match_count, self.max_difference
 
     @property
-    def inner_differences(self) -> tuple[float, float]:
+    def inner_difference_range(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of the joint pairs and link pairs that differ.
 
         Both are 0 if no pair differs. A link pair is ignored if neither link has a child joint.
@@ -624,7 +624,7 @@ class Alignment:
             {joints[step.a].name: step.conversion for step in self.steps if step.conversion is not None},
         )
 
-    def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
+    def exchangeable_pairs(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield two joint pairs whose partners can be exchanged.
 
         Both pairs have the same kind and the same previous pair.
@@ -652,7 +652,7 @@ class Alignment:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
             # A matched pair of links on these bodies gives the transform from B's body to A's body.
-            T_a_b = known.end @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
+            T_a_b = known.constant_motion @ known.zero_pose @ known.tool @ inverse(self.b.zero_poses[known.b])
             zero_pose, end = self.a.zero_poses[a], IDENTITY
             tilt, shift = pose_difference(zero_pose, T_a_b @ self.b.zero_poses[b])
             if rounding.holds(tilt, shift):
@@ -694,7 +694,7 @@ class AlignmentChoices:
     base: tuple[str, str] | None = None
     X: FloatArray = field(default_factory=lambda: IDENTITY)
     zeros: Mapping[str, tuple[int, float]] = field(default_factory=dict)
-    conversions: Mapping[str, JointTransform] = field(default_factory=dict)
+    conversions: Mapping[str, FreeJointConversion] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
 
 
@@ -757,14 +757,14 @@ class Variables:
         pairs: The values of each joint pair. None for planar and floating joints, and for moving
             joints of different kinds.
         ranges: Range of each variable, rad or m; infinite without limits.
-        rules: Indices of the joint pairs with different mimic rules.
-        coordinates: Each coordinate of B as a function of a variable, by B's joint name.
+        rule_differences: Indices of the joint pairs with different mimic rules.
+        coordinates_b: Each coordinate of B as a function of a variable, by B's joint name.
     """
 
     pairs: tuple[MatchedValues | None, ...]
     ranges: dict[str, tuple[float, float]]
-    rules: tuple[int, ...]
-    coordinates: dict[str, LinearFunction]
+    rule_differences: tuple[int, ...]
+    coordinates_b: dict[str, LinearFunction]
 
     def range(self, line: LinearFunction) -> tuple[float, float]:
         if not line.slope:
@@ -793,7 +793,7 @@ class _VariablesBuilder:
         self.alignment, self.tolerance = alignment, tolerance
         self.trees = alignment.a.tree, alignment.b.tree
         self.step_of_b = {step.b: step for step in alignment.steps}
-        self.coordinates = self._find_coordinates()
+        self.coordinates_b = self._find_coordinates()
         self.depth = alignment.depth
 
     def _find_coordinates(self) -> dict[str, LinearFunction]:
@@ -830,13 +830,13 @@ class _VariablesBuilder:
         if joint.kind is JointKind.FIXED:
             return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
-            return self.coordinates[joint.name]
-        return self.coordinates[joint.mimic.mimicked_joint].compose(
+            return self.coordinates_b[joint.name]
+        return self.coordinates_b[joint.mimic.mimicked_joint].compose(
             joint.mimic.multiplier, joint.mimic.offset
         )
 
     def variables(self) -> Variables:
-        pairs, rules = list[MatchedValues | None](), list[int]()
+        pairs, rule_differences = list[MatchedValues | None](), list[int]()
         for i, step in enumerate(self.alignment.steps):
             if step.kind in ("planar", "floating") or step.kind_difference == "kind":
                 pairs.append(None)
@@ -848,9 +848,9 @@ class _VariablesBuilder:
                 rounding = max(0.0, abs(a.constant - b.constant) - self._joint_rounding(a))
                 b = a
             elif not step.kind_difference:
-                rules.append(i)
+                rule_differences.append(i)
             pairs.append(MatchedValues(a, b, b_unconverted, rounding))
-        return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.coordinates)
+        return Variables(tuple(pairs), self._ranges(pairs), tuple(rule_differences), self.coordinates_b)
 
     def _are_equal(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two functions differ by rounding only.

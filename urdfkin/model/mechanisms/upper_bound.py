@@ -33,7 +33,7 @@ terms of these joints may be largest in different configurations. The sum of the
 maximum. A second bound is the sum of upper bounds on the displacements by the motions L. This sum is valid
 if all matched joints have equal axes and equal values. The result is the smaller bound.
 
-**Second derivatives.** The function `curvature` computes bounds joint by joint, from the frame to the base.
+**Second derivatives.** `curvature_bounds` computes bounds joint by joint, from the frame to the base.
 
     D = p_B - p_A:      difference of the frame's positions in A and B
     S, u, o, t:         screw, axis, point and value of joint i in A
@@ -73,7 +73,7 @@ from urdfkin.model.tree import FloatArray, pose
 
 _FULL_TURN = 2.0 * math.pi
 #: Number of corners of a polygon around a circle; the corners are 0.1 % outside the circle.
-_CORNERS = 64
+_CIRCLE_CORNER_COUNT = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +91,15 @@ class Grid:
     @property
     def points(self) -> FloatArray:
         """The grid points (n, 3)."""
-        return _points(self.cells)
+        return _cube_surface_points(self.cells)
 
     @property
-    def lengths(self) -> FloatArray:
+    def point_norms(self) -> FloatArray:
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
 
 @cache
-def _points(cells: int) -> FloatArray:
+def _cube_surface_points(cells: int) -> FloatArray:
     across = np.linspace(-1.0, 1.0, cells + 1)
     second, third = (x.ravel() for x in np.meshgrid(across, across, indexing="ij"))
     faces = []
@@ -155,7 +155,7 @@ class Support:
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
         """Return the maximum of h over all rotations about `screw` from `low` to `high` (rad)."""
-        angles, factors = np.array(_corners(low, high, self.grid.segments)).T
+        angles, factors = np.array(_polygon_around_arc(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
         best = centred.rotate_values(screw.direction, angles, factors).max(axis=0)
@@ -196,7 +196,7 @@ class Support:
     def radius(self, screw: Screw) -> float:
         """Return an upper bound (m) on the distance of the points from a screw's line."""
         x, y, _ = rotation_with_z_axis(screw.direction).T
-        corners = _corners(0.0, _FULL_TURN, _CORNERS)
+        corners = _polygon_around_arc(0.0, _FULL_TURN, _CIRCLE_CORNER_COUNT)
         u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
         return float(max((self.evaluate(u) - u @ screw.point).max(), 0.0))
 
@@ -212,7 +212,7 @@ class Support:
             |u| >= cos r  sum of c_k |g_k|
             h(u) / |u| <= max of h(g_k) / |g_k|  / cos r
         """
-        largest = float((self.values / self.grid.lengths).max(initial=0.0))
+        largest = float((self.values / self.grid.point_norms).max(initial=0.0))
         if math.isnan(largest):  # zero times infinity proves nothing
             return math.inf
         return largest / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
@@ -225,7 +225,7 @@ def point_support(grid: Grid, p: FloatArray) -> Support:
     return Support(grid, grid.points @ p)
 
 
-def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
+def _polygon_around_arc(low: float, high: float, segments: int) -> list[tuple[float, float]]:
     """Enclose an arc of the unit circle in a polygon.
 
     Returns:
@@ -246,7 +246,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 COARSE_GRID, FINE_GRID = Grid(8, 24), Grid(16, 48)
 #: Maximum number of intervals between the samples of a revolute joint's variable.
 #: If a range needs more intervals, the joint's angles in A and B are treated as independent.
-MOST_VALUES = 1024
+MAX_SAMPLE_INTERVALS = 1024
 
 
 def upper_bounds(
@@ -261,19 +261,23 @@ def upper_bounds(
         Both are 0 if nothing differs on the path. A result is inf if no bound is proven.
         Matched moving joints of different kinds give inf.
     """
-    steps, pairs = from_first_difference(alignment, variables, frame)
-    if not steps and frame.end is IDENTITY:
+    steps, pairs = joints_from_first_difference(alignment, variables, frame)
+    if not steps and frame.constant_motion is IDENTITY:
         return 0.0, 0.0
     if any(step.kind_difference and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _angle_bound(steps, pairs, variables, frame)
     if not steps:  # no joint differs, so the distance is constant
-        d = frame.end[:3, :3] @ frame.zero_pose[:3, 3] + frame.end[:3, 3] - frame.zero_pose[:3, 3]
+        d = (
+            frame.constant_motion[:3, :3] @ frame.zero_pose[:3, 3]
+            + frame.constant_motion[:3, 3]
+            - frame.zero_pose[:3, 3]
+        )
         return float(np.linalg.norm(d)), radians
     return _distance_bound(steps, pairs, variables, frame, grid), radians
 
 
-def from_first_difference(
+def joints_from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return a frame's joint pairs and their values, beginning with the first joint that differs."""
@@ -297,9 +301,9 @@ def _angle_bound(
 
     The bound is the sum of the largest angles that the differences can cause.
     """
-    total = pose_difference(IDENTITY, frame.end)[0]
+    total = pose_difference(IDENTITY, frame.constant_motion)[0]
     for step, pair in zip(steps, pairs, strict=True):
-        total += pose_difference(IDENTITY, step.before)[0]
+        total += pose_difference(IDENTITY, step.constant_motion)[0]
         if step.kind != "turns" or pair is None:
             continue
         if step.axis_b is not step.axis_a:
@@ -319,12 +323,14 @@ def _distance_bound(
     frame: FramePair,
     grid: Grid,
 ) -> float:
-    d, y = start_at_frame(frame, grid)
-    by_constant_motions = _displacement_bound(frame.end, y.max_distance())
+    d, y = supports_at_frame(frame, grid)
+    by_constant_motions = _displacement_bound(frame.constant_motion, y.max_distance())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
-        d, y = after_joint(step, pair, variables, d, y)
+        d, y = supports_after_joint(step, pair, variables, d, y)
         moves_alike = step.axis_b is step.axis_a and pair is not None and pair.a == pair.b
-        by_constant_motions += _displacement_bound(step.before, y.max_distance()) if moves_alike else math.inf
+        by_constant_motions += (
+            _displacement_bound(step.constant_motion, y.max_distance()) if moves_alike else math.inf
+        )
     return min(d.max_distance(), by_constant_motions)
 
 
@@ -344,42 +350,42 @@ def _product(factor: float, reach: float) -> float:
     return factor * reach if factor else 0.0
 
 
-def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+def supports_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
     """Return the support functions of d and y at the frame."""
-    p, end = frame.zero_pose[:3, 3], frame.end
+    p, end = frame.zero_pose[:3, 3], frame.constant_motion
     y = end[:3, :3] @ p + end[:3, 3]
     return point_support(grid, y - p), point_support(grid, y)
 
 
-def after_joint(
+def supports_after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return the support functions of d and y after a joint's motion and L."""
     # Planar and floating joints rotate without limits, so they allow every direction of d.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
-        d = Support(d.grid, d.max_distance() * d.grid.lengths)
+        d = Support(d.grid, d.max_distance() * d.grid.point_norms)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
-        d = d_after_joint(step, pair, variables, y, d)
+        d = d_support_after_joint(step, pair, variables, y, d)
         ends = variables.range(pair.b)
         y = (
             y.rotate(step.axis_b, *ends)
             if step.kind == "turns"
             else y.translate(step.axis_b.direction, *ends)
         )
-    return after_constant_motion(step, d, y)
+    return supports_after_constant_motion(step, d, y)
 
 
-def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
+def supports_after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
     """Return the support functions of d and y after the rigid motion L."""
-    if step.before is IDENTITY:
+    if step.constant_motion is IDENTITY:
         return d, y
-    G, L = d.grid.points, step.before
+    G, L = d.grid.points, step.constant_motion
     return Support(d.grid, d.values + y.evaluate(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.transform(L)
 
 
-def d_after_joint(
+def d_support_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
     """Return the support function of d after a joint's motion, without the motion L."""
@@ -388,9 +394,9 @@ def d_after_joint(
         about = Screw(step.axis_a.direction, np.zeros(3))
         if same:
             return d.rotate(about, *variables.range(pair.a)) if d.values.any() else d
-        z = _values(pair, variables, d.grid)
-        if z is not None:
-            return _common_difference(step, pair, z, y, d)
+        samples = _variable_samples(pair, variables, d.grid)
+        if samples is not None:
+            return _common_variable_difference(step, pair, samples, y, d)
         return d.rotate(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
     return d if same else d + _prismatic_difference(step, pair, variables, y.grid)
 
@@ -419,14 +425,14 @@ def _prismatic_difference(
     return Support(grid, np.where(np.isnan(max_difference), np.inf, max_difference))
 
 
-def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
+def _variable_samples(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
     """Return samples of the variable that moves two matched revolute joints.
 
     Returns:
         (n,) samples, or None in these cases:
 
             A's and B's joints have different variables
-            the range needs more than `MOST_VALUES` intervals
+            the range needs more than `MAX_SAMPLE_INTERVALS` intervals
             the range is infinite, and a slope is not 0, 1 or -1
     """
     if (name := pair.variable) is None:
@@ -438,17 +444,17 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
             return None
         low, high = -math.pi, math.pi
     count = max(1, math.ceil(fastest * (high - low) / math.pi * grid.segments))
-    return np.linspace(low, high, count + 1) if count <= MOST_VALUES else None
+    return np.linspace(low, high, count + 1) if count <= MAX_SAMPLE_INTERVALS else None
 
 
-def _common_difference(
-    step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
+def _common_variable_difference(
+    step: MatchedJoints, pair: MatchedValues, samples: FloatArray, y: Support, d: Support
 ) -> Support:
     """Return the support function of d after two matched revolute joints with a common variable.
 
     Definitions and bounds:
 
-        z:              samples of the variable
+        samples:        samples of the variable
         h:              distance of neighbouring samples
         between them:   larger bound at the two samples + h^2/8 max |second derivative|
 
@@ -468,7 +474,7 @@ def _common_difference(
     """
     G = y.grid.points
     axis, other = step.axis_a, step.axis_b
-    t, t_other = (line.constant + line.slope * z for line in (pair.a, pair.b))
+    t, t_other = (line.constant + line.slope * samples for line in (pair.a, pair.b))
     turns = [rotation_about(screw.direction, values) for screw, values in ((axis, t), (other, t_other))]
     D = turns[1] - turns[0]
     c = (other.point - turns[1] @ other.point) - (axis.point - turns[0] @ axis.point)
@@ -484,9 +490,9 @@ def _common_difference(
     else:
         second = _product(pair.a.slope**2, y.radius(axis)) + _product(pair.b.slope**2, radius)
     between = np.maximum(at_samples[:-1], at_samples[1:])
-    between = between + second * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
+    between = between + second * (samples[1] - samples[0]) ** 2 / 8.0 * y.grid.point_norms
     if d.values.any():
-        half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
+        half = abs(pair.a.slope) * (samples[1] - samples[0]) / 2.0
         ends = d.rotate_values(axis.direction, t, 1.0)
         middles = d.rotate_values(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
         between += np.maximum(np.maximum(ends[:-1], ends[1:]), middles)
@@ -519,10 +525,10 @@ def _independent_difference(
 
 
 #: Support functions of the vectors d and y.
-_Vectors = tuple[Support, Support]
+_SupportPair = tuple[Support, Support]
 
 
-def curvature(
+def curvature_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
     """Return upper bounds on the lengths of the second derivatives of D for each pair of variables.
@@ -537,7 +543,7 @@ def curvature(
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     M = np.zeros((len(names), len(names)))
-    for i, j, bound in _second_derivatives(steps, pairs, variables, frame):
+    for i, j, bound in _second_derivative_bounds(steps, pairs, variables, frame):
         both = pairs[i], pairs[j]
         if not all(one.a.slope or one.b.slope for one in both):
             continue
@@ -555,7 +561,7 @@ def curvature(
     return names, M
 
 
-def _second_derivatives(
+def _second_derivative_bounds(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
     """Yield upper bounds on the second derivatives of D with respect to two joints.
@@ -564,41 +570,52 @@ def _second_derivatives(
         Indices i and j <= i of the joints, and the bound.
     """
     free = [_as_free_vectors(step) for step in steps]
-    d, y = start_at_frame(frame, COARSE_GRID)
+    d, y = supports_at_frame(frame, COARSE_GRID)
     for i in reversed(range(len(steps))):
-        first = _derivatives(steps[i], pairs[i], variables, d, y)
+        first = _derivative_supports(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":
-            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
-        vectors = after_constant_motion(free[i], *first)
+            yield (
+                i,
+                i,
+                _length_bound_at_base(
+                    _cross_product_supports(free[i], *first), free[: i + 1], pairs, variables
+                ),
+            )
+        supports = supports_after_constant_motion(free[i], *first)
         for j in reversed(range(i)):
             if steps[j].kind == "turns":
-                second = _derivatives(free[j], pairs[j], variables, *vectors)
-                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
-                vectors = after_joint(free[j], pairs[j], variables, *vectors)
+                second = _derivative_supports(free[j], pairs[j], variables, *supports)
+                yield i, j, _length_bound_at_base(second, free[: j + 1], pairs, variables)
+                supports = supports_after_joint(free[j], pairs[j], variables, *supports)
             else:
-                vectors = after_constant_motion(free[j], *vectors)
-        d, y = after_joint(steps[i], pairs[i], variables, d, y)
+                supports = supports_after_constant_motion(free[j], *supports)
+        d, y = supports_after_joint(steps[i], pairs[i], variables, d, y)
 
 
-def _pass_to_front(
-    vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
+def _length_bound_at_base(
+    supports: _SupportPair,
+    steps: Sequence[MatchedJoints],
+    pairs: Sequence[MatchedValues],
+    variables: Variables,
 ) -> float:
     """Return an upper bound on the length of d at the base.
 
-    `vectors` contains the support functions of d and y before the motion L of `steps[-1]` is applied.
+    `supports` contains the support functions of d and y before the motion L of `steps[-1]` is applied.
     """
-    vectors = after_constant_motion(steps[-1], *vectors)
+    supports = supports_after_constant_motion(steps[-1], *supports)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
-        vectors = (
-            after_constant_motion(step, *vectors) if slides else after_joint(step, pair, variables, *vectors)
+        supports = (
+            supports_after_constant_motion(step, *supports)
+            if slides
+            else supports_after_joint(step, pair, variables, *supports)
         )
-    return vectors[0].max_distance()
+    return supports[0].max_distance()
 
 
-def _derivatives(
+def _derivative_supports(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
-) -> _Vectors:
+) -> _SupportPair:
     """Return bounds on the derivatives of d and y with respect to a joint's value.
 
     The motion L is not included.
@@ -606,11 +623,11 @@ def _derivatives(
     if step.kind != "turns":
         u, other = step.axis_a.direction, step.axis_b.direction
         return point_support(d.grid, other - u), point_support(d.grid, other)
-    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.axis_b, *variables.range(pair.b))
-    return _cross_products(step, d, y)
+    d, y = d_support_after_joint(step, pair, variables, y, d), y.rotate(step.axis_b, *variables.range(pair.b))
+    return _cross_product_supports(step, d, y)
 
 
-def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
+def _cross_product_supports(step: MatchedJoints, d: Support, y: Support) -> _SupportPair:
     """Return upper bounds on the support functions of two derivatives.
 
         d_i = u x d + (u' - u) x (y - o') + u x (o - o')
@@ -625,7 +642,7 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
         by_axes = float(np.linalg.norm(other.direction - axis.direction)) * reach
         by_axes += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
     across_a, across_b = np.cross(G, axis.direction), np.cross(G, other.direction)
-    d_cross = Support(d.grid, d.evaluate(across_a) + by_axes * d.grid.lengths)
+    d_cross = Support(d.grid, d.evaluate(across_a) + by_axes * d.grid.point_norms)
     return d_cross, Support(d.grid, y.evaluate(across_b) - across_b @ other.point)
 
 
@@ -636,8 +653,8 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
     """
     axis = Screw(step.axis_a.direction, np.zeros(3))
     other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
-    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
-    return replace(step, axis_a=axis, axis_b=other, before=before)
+    constant_motion = IDENTITY if step.constant_motion is IDENTITY else pose(step.constant_motion[:3, :3])
+    return replace(step, axis_a=axis, axis_b=other, constant_motion=constant_motion)
 
 
 def relevant_joints(
@@ -652,7 +669,7 @@ def relevant_joints(
         alignment.path(frame.previous),
         [variables.pairs[i] for i in alignment.indices(frame.previous)],
     )
-    first = len(steps) - len(from_first_difference(alignment, variables, frame)[0])
+    first = len(steps) - len(joints_from_first_difference(alignment, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
             first = i
