@@ -106,14 +106,14 @@ def chain_command(
             "placement": path.placement(path_q).tolist(),
         }
 
-    def rows() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["i", "joint", "kind", "backwards", *(f"{name}{axis}" for name in "zOd" for axis in "xyz")]
         for i, (joint, *vectors) in enumerate(joints, 1):
             numbers = [repr(x) for vector in vectors for x in vector.tolist()]
             yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
 
     check = check_chain(loaded.verifier, path, inputs.q) if verify else None
-    return Answer(document, {"json": data, "csv": rows}, *format_path_check(check))
+    return Answer(document, {"json": data, "csv": csv_rows}, *format_path_check(check))
 
 
 def _kind_of_joint(joint: Any) -> str:

@@ -320,7 +320,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         )
         yield from _format_samples(x, 2, "csv, json or npy", table)
 
-    def rows() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield [_TIME[x.t is not None], "joint", "kind", *SIX_VECTOR_LABELS]
         for k, t in enumerate(_times(x)):
             for joint, kind, six in found.contributions((k,)):
@@ -339,7 +339,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         }
 
     title = f"acceleration of {x.frame}, {reference}, by joint"
-    return _verified_answer(x, title, parts, json=data, csv=rows, npy=lambda: found.terms)
+    return _verified_answer(x, title, parts, json=data, csv=csv_rows, npy=lambda: found.terms)
 
 
 # -- commands with options of their own --------------------------------------------------------------
@@ -591,7 +591,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             ],
         }
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         sides = ("", " lower", " upper")
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
         yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.velocity_names)]
@@ -602,7 +602,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     settings = "".join(f", {name} {word}" for name, word in x.settings.items() if isinstance(word, str))
     title = f"singular values of {x.frame}, {rows} rows{settings}"
     return _verified_answer(
-        x, title, lambda: _format_samples(x, _MAX_SAMPLES, "csv or json", parts), json=data, csv=lines
+        x, title, lambda: _format_samples(x, _MAX_SAMPLES, "csv or json", parts), json=data, csv=csv_rows
     )
 
 

@@ -157,13 +157,15 @@ def _orders(robot: Robot) -> Answer:
         title = f"{robot.name}: index of each joint in q; 7/6 means index 7 in q and index 6 in v"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["joint", *cells]
         for name, *row in zip(robot.joint_names, *cells.values(), strict=True):
             yield [csv_cell(name), *row]
 
     conventions = {name: _convention_data(conversion) for name, conversion in found.items()}
-    return Answer(document, {"json": lambda: {"robot": robot.name, "conventions": conventions}, "csv": lines})
+    return Answer(
+        document, {"json": lambda: {"robot": robot.name, "conventions": conventions}, "csv": csv_rows}
+    )
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
@@ -233,11 +235,11 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
             document[letter] = {"names": list(names[letter]), "reordering": entry}
         return document
 
-    def lines() -> Iterator[list[object]]:
+    def csv_rows() -> Iterator[list[object]]:
         yield ["what", "name", "index", "factor", "zero"]
         for letter, one in found.items():
             if one is not None:
                 cells = zip(names[letter], one.index, map(repr, one.factor), map(repr, one.zero), strict=True)
                 yield from ([letter, csv_cell(name), *more] for name, *more in cells)
 
-    return Answer(lambda: TextDocument("", list(code())), {"json": data, "csv": lines})
+    return Answer(lambda: TextDocument("", list(code())), {"json": data, "csv": csv_rows})
