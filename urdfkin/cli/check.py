@@ -28,7 +28,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import format_count, write_output
 from urdfkin.cli.shell import complete_code, complete_file
-from urdfkin.cli.streams import escape_for_terminal, print_commands, say, say_styled
+from urdfkin.cli.streams import escape_for_terminal, print_github_commands, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes, read_start, require_regular_file, write_file
 from urdfkin.system.git import CommitFiles, merge_base_files
@@ -103,7 +103,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         click.echo(as_sarif(findings, version, outcome.silenced_findings))
     elif style == "github":
         if findings:
-            print_commands(as_github(findings))
+            print_github_commands(as_github(findings))
     elif statistics:
         for line in format_statistics(outcome.findings):
             say(line)
@@ -367,8 +367,8 @@ def _make_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
         fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
         fix=options["fix"],
         diff=options["diff"],
-        unsafe=options["unsafe_fixes"],
-        version=None if since is None else merge_base_files(since, Path()),
+        allows_unsafe_fixes=options["unsafe_fixes"],
+        commit_files=None if since is None else merge_base_files(since, Path()),
         writes_baseline=writing,
     )
 
@@ -396,8 +396,8 @@ class CheckRun:
     fold: bool
     fix: bool
     diff: bool
-    unsafe: bool
-    version: CommitFiles | None
+    allows_unsafe_fixes: bool
+    commit_files: CommitFiles | None
     writes_baseline: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
     _checked_files: set[str] = field(default_factory=set)
@@ -427,8 +427,8 @@ class CheckRun:
             return
         text = read_source(file, self.examine_text.keywords["limits"].bytes, load_options()["xacro_args"])
         before = None
-        if self.version is not None:
-            before = find_known_findings(text, self.version, self.examine_text)
+        if self.commit_files is not None:
+            before = find_known_findings(text, self.commit_files, self.examine_text)
             if before is None:
                 self.outcome.unchanged_count += 1
                 return
@@ -444,7 +444,7 @@ class CheckRun:
 
     def _check_usd_or_mjcf(self, file: str) -> None:
         suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
-        if self.version is not None and self._is_unchanged(file, suffixes, self.version):
+        if self.commit_files is not None and self._is_unchanged(file, suffixes, self.commit_files):
             self.outcome.unchanged_count += 1
             return
         from urdfkin.robot.loading import load
@@ -465,18 +465,20 @@ class CheckRun:
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
         self.outcome.add(file, Examination(text, data, None, findings, ()))
 
-    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: CommitFiles) -> bool:
-        """Return whether a file and its included files are the same as in the commit `version`.
+    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], commit_files: CommitFiles) -> bool:
+        """Return whether a file and its included files are the same as in `commit_files`.
 
         Every file of the commit with a suffix in `suffixes` counts as an included file. A file that was
         deleted after the commit also counts if the deleted file's name occurs in the checked file.
         """
         if suffixes not in self._has_changes:
-            self._has_changes[suffixes] = version.has_changes(suffixes)
+            self._has_changes[suffixes] = commit_files.has_changes(suffixes)
         if self._has_changes[suffixes]:
             return False
         data = read_bytes(Path(file))
-        return version.contains(data) and not any(os.fsencode(name) in data for name in version.missing_names)
+        return commit_files.contains(data) and not any(
+            os.fsencode(name) in data for name in commit_files.missing_names
+        )
 
     def _fix(self, file: str, text: UrdfText, make_predicate: Any) -> UrdfText:
         path = None if text.entry is not None or is_xacro(text.source) else find_local_path(text)
@@ -492,7 +494,8 @@ class CheckRun:
             # --fix does not change a file with an error.
             if not any(finding.severity is Severity.ERROR for finding in findings):
                 self.outcome.unsafe_count += sum(
-                    chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe for f in findings
+                    chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.allows_unsafe_fixes
+                    for f in findings
                 )
             return text
         if result.fixed_findings:
@@ -502,7 +505,7 @@ class CheckRun:
 
     def _make_safe_predicate(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
         return lambda finding: (
-            is_chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
+            is_chosen(finding) and (self.allows_unsafe_fixes or finding.fix is None or finding.fix.is_safe)
         )
 
     def _apply_strict(self, finding: Finding) -> Finding:

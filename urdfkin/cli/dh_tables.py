@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.cli.options import lock_settings, locked_line
-from urdfkin.cli.output import Answer, format_path_check
+from urdfkin.cli.output import Answer, format_pinocchio_check
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
@@ -134,7 +134,8 @@ def _make_tables_answer(request: DHRequest) -> Answer:
     if format_ == "json":
         lock = lock_settings(request.robot)
         documents = [
-            {**to_mapping(table), **lock, "checked": format_path_check(check)[0]} for table, check in results
+            {**to_mapping(table), **lock, "checked": format_pinocchio_check(check)[0]}
+            for table, check in results
         ]
         text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
@@ -179,7 +180,7 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
 
 def _lines_below_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    yield format_path_check(check)[0]
+    yield format_pinocchio_check(check)[0]
     yield from _locked_lines(request)
     if request.format_ in _TRANSFORM_DIGITS:
         yield from str(measure_printed_table(table, request.units, _TRANSFORM_DIGITS[request.format_])).split(
@@ -213,7 +214,7 @@ def _make_tree_answer(request: DHRequest) -> Answer:
     else:
         text = tree_document(parameters, request.units).render(format_)
     check = robot.verifier.check_tree_parameters(parameters) if robot.verifier.policy else None
-    check_line = "\n".join([str(check or format_path_check(None)[0]), *_locked_lines(request)])
+    check_line = "\n".join([str(check or format_pinocchio_check(None)[0]), *_locked_lines(request)])
     if format_ in _FORMATS_WITH_CHECK_LINE:
         q = draw_samples(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
         text += f"\n{check_line}\n{measure_printed_tree(parameters, request.units, q)}\n"

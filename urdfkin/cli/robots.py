@@ -86,7 +86,7 @@ def info_command(robot: str) -> Answer:
     loaded = load_robot(robot)
     data = {
         "json": lambda: _describe(loaded),
-        "csv": lambda: _rows(loaded._text_document(), loaded.tree.links),
+        "csv": lambda: _link_rows(loaded._text_document(), loaded.tree.links),
     }
     return Answer(
         loaded._text_document, data, fit_document=lambda out: _fit_to_terminal(out, loaded._text_document())
@@ -106,7 +106,7 @@ def _fit_to_terminal(out: Console, document: TextDocument) -> TextDocument:
     return replace(document, parts=parts)
 
 
-def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
+def _link_rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)
@@ -114,7 +114,7 @@ def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
                 yield [csv_cell(link), *(csv_value(str(cell)) for cell in cells)]
 
 
-_NO_ORDER = (
+_UNKNOWN_ORDER_NOTE = (
     "The joint order of idyntree follows no known rule; give it as robot.convention('idyntree', joints=[...])"
     ", or as `joints` in a TOML file"
 )
@@ -145,7 +145,7 @@ def _orders(robot: Robot) -> Answer:
     from urdfkin.model.conventions import BUILT_IN, find_convention
 
     found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
-    cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
+    cells = {name: _index_cells(robot, conversion) for name, conversion in found.items()}
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, column in cells.items():
         groups.setdefault(column, []).append(name)
@@ -155,7 +155,7 @@ def _orders(robot: Robot) -> Answer:
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
         title = f"{robot.name}: index of each joint in q; 7/6 means index 7 in q and index 6 in v"
-        return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
+        return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _UNKNOWN_ORDER_NOTE])
 
     def csv_rows() -> Iterator[list[object]]:
         yield ["joint", *cells]
@@ -168,7 +168,7 @@ def _orders(robot: Robot) -> Answer:
     )
 
 
-def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
+def _index_cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return one text for each joint: the indices of the joint in q and v.
 
     The text is the joint's index in q, for example "7", or the joint's first and last index, "7-13". If the
@@ -180,13 +180,13 @@ def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     def span(found: list[int]) -> str:
         return str(found[0]) if len(found) == 1 else f"{found[0]}-{found[-1]}"
 
-    def cell(name: str) -> str:
+    def index_cell(name: str) -> str:
         if name not in indices:
             return "-"
         q, v = map(span, indices[name])
         return q if q == v else f"{q}/{v}"
 
-    return tuple(map(cell, robot.joint_names))
+    return tuple(map(index_cell, robot.joint_names))
 
 
 def _convention_data(conversion: Conversion) -> dict[str, Any]:
@@ -211,7 +211,7 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
     found = {letter: find_reordering(letter, start, end) for letter in "qv"}
     names = {"q": end.coordinate_names, "v": end.velocity_names}
 
-    def code() -> Iterator[str]:
+    def code_lines() -> Iterator[str]:
         for letter, one in found.items():
             if one is not None:
                 yield one.code(f"{letter}_to", f"{letter}_from")
@@ -242,4 +242,4 @@ def _conversion_code(start: Conversion, end: Conversion) -> Answer:
                 cells = zip(names[letter], one.index, map(repr, one.factor), map(repr, one.zero), strict=True)
                 yield from ([letter, csv_cell(name), *more] for name, *more in cells)
 
-    return Answer(lambda: TextDocument("", list(code())), {"json": data, "csv": csv_rows})
+    return Answer(lambda: TextDocument("", list(code_lines())), {"json": data, "csv": csv_rows})

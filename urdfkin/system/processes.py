@@ -35,8 +35,11 @@ def python_command(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 def _import_path() -> list[str]:
     # Empty and relative entries of `sys.path` depend on the current folder.
-    home = str(Path(__file__).resolve().parents[2])
-    return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)), home]
+    package_parent = str(Path(__file__).resolve().parents[2])
+    return [
+        *(entry for entry in sys.path if Path(entry).is_absolute() and not _is_dask_folder(entry)),
+        package_parent,
+    ]
 
 
 def _is_dask_folder(entry: str) -> bool:
@@ -93,13 +96,13 @@ def avoid_settings_file(settings: str) -> Iterator[None]:
     if not os.path.lexists(settings):
         yield
         return
-    here = os.open(".", os.O_PATH)
+    folder_descriptor = os.open(".", os.O_PATH)
     os.chdir("/")
     try:
         yield
     finally:
-        os.fchdir(here)
-        os.close(here)
+        os.fchdir(folder_descriptor)
+        os.close(folder_descriptor)
 
 
 _T = TypeVar("_T")
