@@ -35,7 +35,7 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_value
+from urdfkin.errors.escape import csv_number_or_text
 from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 
 if TYPE_CHECKING:
@@ -230,7 +230,7 @@ def write_vectors(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
     def csv_rows() -> Iterator[tuple[object, ...]]:
         yield "robot", "file", "numbers"
         for one in written:
-            yield csv_value(one.robot), csv_value(one.files[0].name), one.numbers
+            yield csv_number_or_text(one.robot), csv_number_or_text(one.files[0].name), one.numbers
 
     data = {
         "folder": str(folder),

@@ -29,8 +29,8 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_value, json_text
-from urdfkin.system.files import exists, write_file
+from urdfkin.errors.escape import csv_number_or_text, json_text
+from urdfkin.system.files import may_exist, write_file
 
 if TYPE_CHECKING:
     from urdfkin.comparison.readers import LibraryReading
@@ -248,7 +248,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     check_writable(markdown)
     for source in (a, b, *more):
-        if _GIT_VERSION.fullmatch(source) and not exists(Path(source)):
+        if _GIT_VERSION.fullmatch(source) and not may_exist(Path(source)):
             remedy = "write `git show VERSION:FILE | urdfkin diff - FILE`"
             raise InputError("this is a version in git, not a file", found=source, remedy=remedy)
     robots = load_robots(a, b, *more)
@@ -264,7 +264,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     rows = [(*result.sources, *row) if more else row for result in found for row in rows_of(result)]
     data = {
         "json": lambda: {"pairs": list(map(as_data, found))} if more else as_data(found[0]),
-        "csv": lambda: [heads, *(map(csv_value, row) for row in rows)],
+        "csv": lambda: [heads, *(map(csv_number_or_text, row) for row in rows)],
         "markdown": as_markdown,
     }
     code = int(any(found))
@@ -307,9 +307,9 @@ def readers_command(robot: str, libraries: str | None, samples: int, seed: int) 
         yield ["library", "version", "joint", "element", "difference", "size"]
         for reading in found:
             if reading.refused is not None:
-                yield [reading.library, reading.version, "", "", csv_value(reading.refused), ""]
+                yield [reading.library, reading.version, "", "", csv_number_or_text(reading.refused), ""]
             for difference in reading.differences:
-                words = map(csv_value, (difference.joint, difference.element, difference.words))
+                words = map(csv_number_or_text, (difference.joint, difference.element, difference.words))
                 yield [reading.library, reading.version, *words, repr(difference.size)]
 
     data = {"robot": loaded.name, "readers": [reading.as_dict() for reading in found]}

@@ -21,7 +21,7 @@ from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import number_remedy, parse_float, parse_int
 from urdfkin.model.reference import Reference
-from urdfkin.system.files import MAX_DATA_BYTES, read_standard_input, read_text, shorten_path
+from urdfkin.system.files import MAX_DATA_BYTES, abbreviate_path, read_standard_input, read_text
 from urdfkin.verify.oracles import ORACLES
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def format_from_suffix(
         if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
-                where=shorten_path(output),
+                where=abbreviate_path(output),
                 remedy=f"use {', '.join(formats)}, or add --format",
             )
         return format_ if chosen else default_format

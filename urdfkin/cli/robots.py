@@ -15,7 +15,7 @@ import click
 from urdfkin.cli.options import load_robot, robot_argument
 from urdfkin.cli.output import Answer, answer_command
 from urdfkin.errors.display import Table, TextDocument
-from urdfkin.errors.escape import csv_cell, csv_value
+from urdfkin.errors.escape import csv_cell, csv_number_or_text
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.urdf.catalogue import CatalogueEntry, catalogue
 
@@ -111,7 +111,7 @@ def _link_rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[st
         if isinstance(part, Table):
             yield list(part.heads)
             for link, (_, *cells) in zip(links, part.rows, strict=True):
-                yield [csv_cell(link), *(csv_value(str(cell)) for cell in cells)]
+                yield [csv_cell(link), *(csv_number_or_text(str(cell)) for cell in cells)]
 
 
 _UNKNOWN_ORDER_NOTE = (

@@ -91,9 +91,9 @@ def run_python(
 
 
 @contextmanager
-def avoid_settings_file(settings: str) -> Iterator[None]:
+def leave_folder_with_settings(settings_file: str) -> Iterator[None]:
     """Make `/` the current folder if the current folder contains a settings file that must not be read."""
-    if not os.path.lexists(settings):
+    if not os.path.lexists(settings_file):
         yield
         return
     folder_descriptor = os.open(".", os.O_PATH)
